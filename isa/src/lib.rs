@@ -1,0 +1,41 @@
+//! The specification of a neural texture unit: what every bit means.
+//!
+//! Read the modules in this order; it is the order of the texel's journey.
+//!
+//! | module | answers |
+//! |---|---|
+//! | [`round`], [`rescale`] | how a number loses bits, and by whose rule |
+//! | [`latent`] | what a stored code of a grid stands for |
+//! | [`position`] | which grid cells surround a texel of a mip, and how far in it lies |
+//! | [`embed`] | the integers that enter the synthesizer: latents, waves, level |
+//! | [`activation`] | what happens between two layers |
+//! | [`profile`] | every choice that an implementation may make differently, as data |
+//! | [`shape`], [`layer`], [`asset`] | one compressed texture set, validated |
+//! | [`format`](mod@format) | that asset as bytes: the `.ntx` file |
+//! | [`layout`] | where a unit's memory keeps the grids |
+//! | [`instruction`], [`assembly`], [`program`] | the microprogram that decodes one texel |
+//!
+//! Three words never mix: a *code* is packed bits as stored, a *value* is the integer that a code
+//! stands for, a *real* is what the value means. Nothing in this crate computes with floats.
+
+pub mod activation;
+pub mod assembly;
+pub mod asset;
+pub mod embed;
+pub mod error;
+pub mod format;
+pub mod instruction;
+pub mod latent;
+pub mod layer;
+pub mod layout;
+pub mod limits;
+pub mod position;
+pub mod profile;
+pub mod program;
+pub mod rescale;
+pub mod round;
+pub mod shape;
+
+pub use asset::Asset;
+pub use error::AssetError;
+pub use program::Program;

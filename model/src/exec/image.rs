@@ -1,0 +1,37 @@
+//! Image: every texel of a mip.
+
+use super::{Decoder, Machine};
+use crate::request::{BLOCK, Request};
+use ndarray::parallel::prelude::*;
+use ndarray::{Array3, Axis};
+
+impl Decoder<'_> {
+    /// The channel codes of a mip: \[channel, row, column\]. `mip` is below the chain's length.
+    ///
+    /// Rows of texel blocks are decoded in parallel; the codes do not depend on it.
+    #[must_use]
+    pub fn mip(&self, mip: u8) -> Array3<i32> {
+        let shape = &self.asset().shape;
+        let (width, height) = shape.mip_size(mip);
+        let channels = shape.outputs.len();
+        let mut codes = Array3::zeros((channels, height as usize, width as usize));
+        codes
+            .axis_chunks_iter_mut(Axis(1), BLOCK as usize)
+            .into_par_iter()
+            .enumerate()
+            .for_each(|(block_row, mut rows)| {
+                let mut machine = Machine::new(self);
+                for (row, mut texels) in rows.axis_iter_mut(Axis(1)).enumerate() {
+                    let y = block_row as u32 * BLOCK + row as u32;
+                    for (x, mut texel) in texels.axis_iter_mut(Axis(1)).enumerate() {
+                        let request = Request::within(x as u32, y, mip);
+                        let emitted = machine.texel(request, &mut ());
+                        for (code, &value) in texel.iter_mut().zip(emitted) {
+                            *code = value;
+                        }
+                    }
+                }
+            });
+        codes
+    }
+}

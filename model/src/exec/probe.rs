@@ -1,0 +1,29 @@
+//! Probe: whoever watches a texel being decoded.
+
+use super::position::Corners;
+use crate::trace::Fetch;
+
+/// Sees the intermediate values of one texel, in the order in which they arise.
+///
+/// Every method does nothing unless it is overridden; `()` sees nothing and costs nothing. A probe
+/// cannot change a value.
+pub trait Probe {
+    /// A grid's corners, strides and phases.
+    fn position(&mut self, _grid: usize, _corners: &Corners) {}
+    /// The memory that a fetch touches.
+    fn fetch(&mut self, _fetch: &Fetch) {}
+    /// The codes of a grid's four corners, one corner after the other.
+    fn codes(&mut self, _grid: usize, _codes: &[u8]) {}
+    /// Inputs written by `stage` (`concat`, `lerp`, `wave`, `level`) from lane `lane` on.
+    fn embedded(&mut self, _stage: &'static str, _lane: u16, _inputs: &[i16]) {}
+    /// A layer's accumulators: bias plus products.
+    fn accumulators(&mut self, _layer: u16, _accumulators: &[i32]) {}
+    /// The same accumulators after the activation, where there is one.
+    fn activated(&mut self, _accumulators: &[i32]) {}
+    /// The values that a hidden layer writes to its register.
+    fn outputs(&mut self, _layer: u16, _values: &[i16]) {}
+    /// The channel codes.
+    fn emitted(&mut self, _codes: &[i32]) {}
+}
+
+impl Probe for () {}

@@ -1,0 +1,1 @@
+//! Placeholder while the stepped model is built.
