@@ -3,7 +3,8 @@
 //! A name is cut into lower-case words at `_`, `-`, `.`, blanks and inside `camelCase`; words
 //! that only tell resolution or format (`2k`, `png`) are taken off the end; the longest known
 //! ending wins. So `Wood063_1K_Color`, `WaterBottle_baseColor` and `ceramic_roof_01_diff_2k` are
-//! all `color`.
+//! all `color`. Normals are green-up unless the name says `dx`: glTF demands it, and so are the files
+//! that ambientCG published as plain `_Normal` (their green follows the height map).
 
 use super::Encoding;
 use super::Encoding::{Linear, NormalDx, NormalGl, Srgb};
@@ -151,13 +152,6 @@ pub(super) fn parts_of(stem: &str) -> Vec<Part> {
         Some((_, map, encoding)) => (*map, *encoding),
         None => (stem, Linear),
     };
-    // ambientCG wrote `_Normal` for green-down normals before it began to publish both kinds;
-    // glTF exporters and plain lower-case names mean green up.
-    let encoding = if stem.ends_with("_Normal") {
-        NormalDx
-    } else {
-        encoding
-    };
     vec![Part {
         map: map.to_owned(),
         encoding,
@@ -242,7 +236,7 @@ mod tests {
     #[test]
     fn every_convention_names_its_map() {
         one("Wood063_1K_Color", "color", Srgb);
-        one("Wood063_1K_Normal", "normal", NormalDx);
+        one("Wood063_1K_Normal", "normal", NormalGl);
         one("Wood063_1K_NormalGL", "normal", NormalGl);
         one("Wood063_1K_NormalDX", "normal", NormalDx);
         one("RoofingTiles013A_1K-PNG_Displacement", "height", Linear);

@@ -1,0 +1,24 @@
+// Decode: one request an invocation, the stages in the order of the texel's journey.
+
+@compute @workgroup_size(WORKGROUP)
+fn decode(@builtin(global_invocation_id) id: vec3<u32>) {
+    let texel = id.x;
+    if (texel >= arrayLength(&requests)) {
+        return;
+    }
+    let request = requests[texel];
+    tap_texel(texel);
+
+    let corners0 = position(0u, request);
+    let corners1 = position(1u, request);
+    var lane = concat(0u, corners0, 0u);
+    lane = lerp(1u, corners1, lane);
+    lane = waves(request, lane);
+    lane = level(request, lane);
+
+    let last = header.layers_count - 1u;
+    for (var index = 0u; index < last; index++) {
+        hidden_layer(index);
+    }
+    emit(last, texel);
+}

@@ -1,0 +1,133 @@
+//! `ntmu info`: what an asset holds.
+
+use crate::Verdict;
+use crate::{console, files};
+use ntmu::isa::Asset;
+use serde_json::json;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Info {
+    /// The asset, an .ntx file.
+    asset: PathBuf,
+}
+
+impl Info {
+    pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
+        let asset = files::read_asset(&self.asset)?;
+        if json {
+            console::print_json(&describe(&asset))?;
+        } else {
+            print(&asset);
+        }
+        Ok(Verdict::Fine)
+    }
+}
+
+fn describe(asset: &Asset) -> serde_json::Value {
+    let shape = &asset.shape;
+    let grids: Vec<_> = (0..2)
+        .map(|g| {
+            let (width, height) = shape.grid_size(g);
+            json!({
+                "width": width, "height": height, "channels": shape.grids[g].channels,
+                "bits": shape.grids[g].format.bits(), "scale_log2": shape.grids[g].scale_log2,
+            })
+        })
+        .collect();
+    let layers: Vec<_> = asset
+        .layers
+        .iter()
+        .map(|l| {
+            json!({
+                "inputs": l.inputs, "outputs": l.outputs, "activation": l.activation.name(),
+                "zero_point": l.zero_point, "skip_span": l.skip.map(|s| s.span), "macs": l.macs(),
+            })
+        })
+        .collect();
+    let maps: Vec<_> = asset
+        .metadata
+        .maps
+        .iter()
+        .map(|m| {
+            json!({
+                "name": m.name, "first_channel": m.first_channel, "channels": m.channel_count,
+                "encoding": m.encoding.name(), "bit_depth": m.bit_depth,
+            })
+        })
+        .collect();
+    let profile = &asset.profile;
+    json!({
+        "name": asset.metadata.name, "width": shape.width, "height": shape.height,
+        "mips": shape.mip_count, "channels": shape.channel_count(), "maps": maps,
+        "grids": grids, "octaves": shape.octaves, "corner_snap": shape.snap.name(),
+        "address_mode": shape.address_mode.name(), "inputs": shape.input_count(),
+        "weight_bits": asset.weight_bits, "layers": layers,
+        "macs_per_texel": asset.macs(),
+        "grid_bytes": asset.grid_bits().div_ceil(8),
+        "parameter_bytes": asset.parameter_bits().div_ceil(8),
+        "bppc": ntmu::quality::bppc(asset),
+        "profile": {
+            "input": profile.input.name(), "leak": profile.leak.name(),
+            "requantize": profile.requantize.name(), "skip": profile.skip.name(),
+            "output": profile.output.name(),
+        },
+        "record": asset.metadata.record.iter().map(|(k, v)| json!([k, v])).collect::<Vec<_>>(),
+    })
+}
+
+fn print(asset: &Asset) {
+    let shape = &asset.shape;
+    let mut facts = console::table(&["asset", "", ""]);
+    let mut fact = |name: &str, value: String, unit: &str| {
+        facts.add_row([name.to_owned(), value, unit.to_owned()]);
+    };
+    fact("name", asset.metadata.name.clone(), "");
+    fact("size", format!("{} × {}", shape.width, shape.height), "texels");
+    fact("mips", shape.mip_count.to_string(), "");
+    fact("channels", shape.channel_count().to_string(), "");
+    for g in 0..2 {
+        let (width, height) = shape.grid_size(g);
+        let grid = shape.grids[g];
+        let size = format!("{width} × {height} × {}", grid.channels);
+        fact(&format!("grid {g}"), size, &format!("latents of {} bits", grid.format.bits()));
+    }
+    fact("synthesizer", asset.macs().to_string(), "multiplications per texel");
+    fact("weights", asset.weight_bits.to_string(), "bits");
+    fact("grids", asset.grid_bits().div_ceil(8).to_string(), "bytes");
+    fact("parameters", asset.parameter_bits().div_ceil(8).to_string(), "bytes");
+    fact("rate", format!("{:.4}", ntmu::quality::bppc(asset)), "bits per pixel and channel");
+    fact("corner snap", shape.snap.name().to_owned(), "");
+    fact("address mode", shape.address_mode.name().to_owned(), "");
+    console::print(&facts.to_string());
+
+    let mut maps = console::table(&["map", "channels", "encoding", "bits"]);
+    for map in &asset.metadata.maps {
+        let last = map.first_channel + map.channel_count - 1;
+        let channels = format!("{}..={last}", map.first_channel);
+        let encoding = map.encoding.name().to_owned();
+        maps.add_row([map.name.clone(), channels, encoding, map.bit_depth.to_string()]);
+    }
+    console::print(&maps.to_string());
+
+    let mut layers = console::table(&["layer", "in", "out", "activation", "zero point", "skip from"]);
+    for (index, layer) in asset.layers.iter().enumerate() {
+        let skip = layer.skip.map_or("".to_owned(), |s| (index - usize::from(s.span)).to_string());
+        layers.add_row([
+            index.to_string(),
+            layer.inputs.to_string(),
+            layer.outputs.to_string(),
+            layer.activation.name().to_owned(),
+            layer.zero_point.to_string(),
+            skip,
+        ]);
+    }
+    console::print(&layers.to_string());
+    if !asset.metadata.record.is_empty() {
+        let mut record = console::table(&["training record", ""]);
+        for (key, value) in &asset.metadata.record {
+            record.add_row([key, value]);
+        }
+        console::print(&record.to_string());
+    }
+}

@@ -1,0 +1,65 @@
+//! The verbs, one file each.
+
+mod compare;
+mod conform;
+mod decode;
+mod encode;
+mod generate;
+mod info;
+mod program;
+mod study;
+mod texel;
+
+use crate::Verdict;
+use clap::{Parser, Subcommand};
+
+/// Model of a texture unit that decodes neural-compressed textures: bit-exact values, cycles,
+/// training, conformance vectors.
+#[derive(Parser)]
+#[command(version, propagate_version = true, arg_required_else_help = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+    /// Print the result as JSON on stdout instead of tables.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Decode, check, time and sweep an asset, and write a report; the built-in one by default.
+    Study(study::Study),
+    /// Train an asset on a texture set.
+    Encode(encode::Encode),
+    /// Decode an asset to image files.
+    Decode(decode::Decode),
+    /// Show what an asset holds.
+    Info(info::Info),
+    /// Decode one texel and show every value on the way.
+    Texel(texel::Texel),
+    /// Print the microprogram of an asset.
+    Program(program::Program),
+    /// Compare an asset, or a decoded folder, with its source.
+    Compare(compare::Compare),
+    /// Run conformance vectors on a device.
+    Conform(conform::Conform),
+    /// Write the built-in texture set as image files.
+    Generate(generate::Generate),
+}
+
+impl Arguments {
+    pub(crate) fn run(self) -> anyhow::Result<Verdict> {
+        let json = self.json;
+        match self.verb {
+            Verb::Study(verb) => verb.run(json),
+            Verb::Encode(verb) => verb.run(json),
+            Verb::Decode(verb) => verb.run(json),
+            Verb::Info(verb) => verb.run(json),
+            Verb::Texel(verb) => verb.run(json),
+            Verb::Program(verb) => verb.run(json),
+            Verb::Compare(verb) => verb.run(json),
+            Verb::Conform(verb) => verb.run(json),
+            Verb::Generate(verb) => verb.run(json),
+        }
+    }
+}

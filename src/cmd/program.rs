@@ -1,0 +1,70 @@
+//! `ntmu program`: the microprogram of an asset as assembly.
+
+use crate::Verdict;
+use crate::{console, files};
+use anyhow::Context as _;
+use ntmu::isa::layout::Layout;
+use ntmu::isa::{Program as Microprogram, assembly};
+use serde_json::json;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Program {
+    /// The asset, an .ntx file.
+    #[arg(required_unless_present = "manual")]
+    asset: Option<PathBuf>,
+    /// Where the unit's memory keeps the grids.
+    #[arg(long, default_value = "linear", value_parser = layout)]
+    layout: Layout,
+    /// Check this assembly against the asset instead of compiling the asset.
+    #[arg(long, value_name = "FILE")]
+    check: Option<PathBuf>,
+    /// Print the reference manual of the instruction set instead.
+    #[arg(long)]
+    manual: bool,
+}
+
+/// The layout with this name.
+pub(crate) fn layout(name: &str) -> Result<Layout, String> {
+    let names = Layout::ALL.map(Layout::name);
+    Layout::ALL
+        .into_iter()
+        .find(|layout| layout.name() == name)
+        .ok_or_else(|| format!("found {name:?}; allowed: {}", names.join(", ")))
+}
+
+impl Program {
+    pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
+        let Some(path) = self.asset.filter(|_| !self.manual) else {
+            console::print(&assembly::manual());
+            return Ok(Verdict::Fine);
+        };
+        let asset = files::read_asset(&path)?;
+        let program = match &self.check {
+            None => Microprogram::compile(&asset, self.layout),
+            Some(file) => {
+                let context = || format!("{}", file.display());
+                let text = std::fs::read_to_string(file).with_context(context)?;
+                let (layout, instructions) = assembly::assemble(&text).with_context(context)?;
+                Microprogram::link(&asset, layout, instructions).with_context(context)?
+            }
+        };
+        let lines: Vec<_> =
+            program.instructions().iter().map(|i| (i.encode(), assembly::disassemble(i))).collect();
+        if json {
+            let instructions: Vec<_> = lines
+                .iter()
+                .map(|(word, text)| json!({ "word": format!("{word:016x}"), "assembly": text }))
+                .collect();
+            let layout = program.layout().name();
+            console::print_json(&json!({ "layout": layout, "instructions": instructions }))?;
+        } else {
+            let mut text = format!(".layout {}\n", program.layout().name());
+            for (word, line) in lines {
+                text.push_str(&format!("{line:<40}; {word:016x}\n"));
+            }
+            console::print(&text);
+        }
+        Ok(Verdict::Fine)
+    }
+}

@@ -1,0 +1,91 @@
+//! Study: everything that the project can say about one asset, as data.
+//!
+//! `ntmu study` prints it, writes it as JSON, and draws it as a report.
+
+mod oracle;
+mod sweep;
+mod timing;
+mod twin;
+
+pub use oracle::{OracleStudy, compare_with_oracle};
+pub use sweep::{SweepPoint, sweep};
+pub use timing::{Charge, TimingRow, simulate};
+pub use twin::{TwinStudy, compare_with_twin};
+
+use crate::quality::{self, Quality};
+use ntmu_isa::Asset;
+use serde::Serialize;
+
+/// What is known of an asset before anything runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AssetStudy {
+    /// The set's name.
+    pub name: String,
+    /// Texels of mip 0 along x and y.
+    pub size: (u32, u32),
+    /// Mips in the chain.
+    pub mips: u8,
+    /// Channels of the set.
+    pub channels: u16,
+    /// Texels of the whole chain.
+    pub texels: u64,
+    /// Bits of a latent of grid 0 and of grid 1.
+    pub latent_bits: [u8; 2],
+    /// Bits of a weight.
+    pub weight_bits: u8,
+    /// Multiplications per texel.
+    pub macs_per_texel: u32,
+    /// Bytes of both grids.
+    pub grid_bytes: u64,
+    /// Bytes of the synthesizer's parameters.
+    pub parameter_bytes: u64,
+    /// Bits per pixel and channel, parameters counted.
+    pub bppc: f64,
+}
+
+impl AssetStudy {
+    /// The facts of an asset.
+    #[must_use]
+    pub fn of(asset: &Asset) -> AssetStudy {
+        let shape = &asset.shape;
+        AssetStudy {
+            name: asset.metadata.name.clone(),
+            size: (shape.width, shape.height),
+            mips: shape.mip_count,
+            channels: shape.channel_count(),
+            texels: shape.texel_count(),
+            latent_bits: shape.grids.map(|grid| grid.format.bits()),
+            weight_bits: asset.weight_bits,
+            macs_per_texel: asset.macs(),
+            grid_bytes: asset.grid_bits().div_ceil(8),
+            parameter_bytes: asset.parameter_bits().div_ceil(8),
+            bppc: quality::bppc(asset),
+        }
+    }
+}
+
+/// All results on one asset.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Study {
+    /// What was studied.
+    pub asset: AssetStudy,
+    /// Against the source, where one was given.
+    pub quality: Option<Quality>,
+    /// Against the real-number truth.
+    pub oracle: OracleStudy,
+    /// Against the GPU twin.
+    pub twin: TwinStudy,
+    /// Per unit and layout.
+    pub timing: Vec<TimingRow>,
+    /// Per latent width and weight width; empty without a source.
+    pub sweep: Vec<SweepPoint>,
+}
+
+impl Study {
+    /// Whether every check held: the twin, if it ran, agreed on every code, and no code was farther
+    /// from the oracle than the derived bound allows.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.twin.holds() && self.oracle.holds()
+    }
+}

@@ -1,0 +1,162 @@
+//! Engine: one step's forward and backward pass over a batch, in parallel and in a fixed order.
+//!
+//! A batch is cut into [`CHUNKS`] chunks whatever the number of threads. Each chunk sums its own
+//! gradients; the sums are added in chunk order. So the result is the same on one thread and on
+//! sixty-four.
+
+use crate::batch::Batch;
+use crate::config::{CHUNKS, TILE};
+use crate::kernel::{Vectorised, vectorised};
+use crate::network::Network;
+use crate::positions::Positions;
+use crate::sampler::{Embedding, Texel, Window};
+use crate::source::Texels;
+use crate::tile::Workspace;
+use crate::topology::Topology;
+use rayon::prelude::*;
+
+/// What a pass reads.
+#[derive(Clone, Copy)]
+pub(crate) struct View<'a> {
+    pub(crate) network: &'a Network,
+    pub(crate) embedding: Embedding,
+    pub(crate) positions: &'a Positions,
+    pub(crate) windows: &'a [Window],
+    /// The latents of both grids, in units of their codes.
+    pub(crate) seen: [&'a [f32]; 2],
+    pub(crate) texels: &'a Texels,
+}
+
+struct Chunk {
+    workspace: Workspace,
+    targets: Vec<f32>,
+    gradient: Vec<f32>,
+    error: f64,
+}
+
+/// The buffers that steps reuse.
+pub(crate) struct Engine {
+    chunks: Vec<Chunk>,
+    pub(crate) batch: Batch,
+    inputs: usize,
+    /// The gradient of the parameters after a step.
+    pub(crate) parameters: Vec<f32>,
+}
+
+impl Engine {
+    pub(crate) fn new(topology: &Topology, batch: usize, channels: usize) -> Engine {
+        let inputs = topology.layers.first().map_or(0, |l| l.rows());
+        let chunk = || Chunk {
+            workspace: Workspace::new(topology),
+            targets: vec![0.0; TILE * channels],
+            gradient: vec![0.0; topology.parameters],
+            error: 0.0,
+        };
+        Engine {
+            chunks: (0..CHUNKS).map(|_| chunk()).collect(),
+            batch: Batch::new(batch, inputs),
+            inputs,
+            parameters: vec![0.0; topology.parameters],
+        }
+    }
+
+    /// Forward and backward over the batch's texels. Leaves the gradient of the mean squared
+    /// error in `self.parameters` and, texel by texel, in the batch; returns that error.
+    pub(crate) fn step(&mut self, view: View<'_>) -> f64 {
+        let Batch { texels, corners: [c0, c1], weights, gradient } = &mut self.batch;
+        let len = texels.len().div_ceil(CHUNKS);
+        let scale = 1.0 / (texels.len() * view.texels.channels) as f32;
+        self.chunks
+            .par_iter_mut()
+            .zip(texels.par_chunks(len))
+            .zip(c0.par_chunks_mut(len).zip(c1.par_chunks_mut(len)))
+            .zip(weights.par_chunks_mut(len).zip(gradient.par_chunks_mut(len * self.inputs)))
+            .for_each(|(((chunk, texels), (c0, c1)), (weights, gradient))| {
+                vectorised(Pass { view, scale, chunk, texels, corners: [c0, c1], weights, gradient });
+            });
+        let (first, rest) = self.chunks.split_at(1);
+        let sums = first.iter().map(|c| &c.gradient);
+        self.parameters.fill(0.0);
+        for gradient in sums.chain(rest.iter().map(|c| &c.gradient)) {
+            for (sum, g) in self.parameters.iter_mut().zip(gradient) {
+                *sum += g;
+            }
+        }
+        self.chunks.iter().map(|c| c.error).sum::<f64>() * f64::from(scale)
+    }
+
+    /// Adds the batch's gradients to those of the latents, in units of the inputs.
+    pub(crate) fn scatter(&self, embedding: Embedding, gradients: [&mut [f32]; 2]) {
+        let [g0, g1] = gradients;
+        let batch = &self.batch;
+        rayon::join(
+            || vectorised(Scatter { embedding, batch, inputs: self.inputs, grid: 0, gradient: g0 }),
+            || vectorised(Scatter { embedding, batch, inputs: self.inputs, grid: 1, gradient: g1 }),
+        );
+    }
+}
+
+struct Pass<'a> {
+    view: View<'a>,
+    scale: f32,
+    chunk: &'a mut Chunk,
+    texels: &'a [Texel],
+    corners: [&'a mut [[u32; 4]]; 2],
+    weights: &'a mut [[f32; 4]],
+    gradient: &'a mut [f32],
+}
+
+impl Vectorised for Pass<'_> {
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        let Pass { view, scale, chunk, texels, corners: [c0, c1], weights, gradient } = self;
+        let Chunk { workspace, targets, gradient: sum, error } = chunk;
+        sum.fill(0.0);
+        *error = 0.0;
+        let channels = view.texels.channels;
+        let width = workspace.inputs.len() / TILE;
+        let tiles = texels.chunks(TILE).zip(gradient.chunks_mut(TILE * width));
+        let corners = c0.chunks_mut(TILE).zip(c1.chunks_mut(TILE)).zip(weights.chunks_mut(TILE));
+        for ((texels, gradient), ((c0, c1), weights)) in tiles.zip(corners) {
+            let rows = workspace.inputs.chunks_exact_mut(width).zip(targets.chunks_exact_mut(channels));
+            for (i, ((row, target), &texel)) in rows.zip(texels).enumerate() {
+                let embedding = view.embedding;
+                embedding.gather(view.positions, view.windows, texel, view.seen, row);
+                let (corners, lerp) = embedding.corners(view.positions, view.windows, texel);
+                c0[i] = corners[0].map(|at| at as u32);
+                c1[i] = corners[1].map(|at| at as u32);
+                weights[i] = lerp;
+                target.copy_from_slice(view.texels.texel(texel.x, texel.y, texel.mip));
+            }
+            workspace.forward::<FUSED>(view.network);
+            *error += workspace.compare(view.network, targets, scale);
+            workspace.backward::<FUSED>(view.network, sum, gradient);
+        }
+    }
+}
+
+struct Scatter<'a> {
+    embedding: Embedding,
+    batch: &'a Batch,
+    inputs: usize,
+    grid: usize,
+    gradient: &'a mut [f32],
+}
+
+impl Vectorised for Scatter<'_> {
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        let Scatter { embedding, batch, inputs, grid, gradient } = self;
+        let rows = batch.gradient.chunks_exact(inputs).zip(&batch.corners[grid]);
+        if grid == 0 {
+            let lanes = 4 * embedding.channels[0];
+            for (row, corners) in rows {
+                embedding.scatter_corners(corners, &row[..lanes], gradient);
+            }
+        } else {
+            for ((row, corners), weights) in rows.zip(&batch.weights) {
+                embedding.scatter_interpolated(corners, weights, row, gradient);
+            }
+        }
+    }
+}
