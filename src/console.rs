@@ -8,7 +8,10 @@ use std::io::Write as _;
 /// program's interest in output, not the program.
 pub(crate) fn print(text: &str) {
     let mut stdout = std::io::stdout().lock();
-    if writeln!(stdout, "{}", text.trim_end()).and_then(|()| stdout.flush()).is_err() {
+    if writeln!(stdout, "{}", text.trim_end())
+        .and_then(|()| stdout.flush())
+        .is_err()
+    {
         // Nobody reads; there is nobody to tell.
     }
 }
@@ -35,7 +38,9 @@ pub(crate) fn complain(error: &anyhow::Error) {
 /// A table whose first column is left-aligned and whose others are right-aligned.
 pub(crate) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_header(header.to_vec());
+    table
+        .load_preset(presets::UTF8_HORIZONTAL_ONLY)
+        .set_header(header.to_vec());
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);
     }

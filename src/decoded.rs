@@ -37,7 +37,9 @@ impl Decoded {
     #[must_use]
     pub fn of_mip(asset: &Asset, mip: u8) -> Decoded {
         let program = Program::compile(asset, Layout::Linear);
-        Decoded { mips: vec![Decoder::new(asset, &program).mip(mip)] }
+        Decoded {
+            mips: vec![Decoder::new(asset, &program).mip(mip)],
+        }
     }
 
     /// The same texels as reals, in the representation of a texture set: 0..=1 for unorm; snorm's

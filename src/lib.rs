@@ -30,5 +30,9 @@ pub mod built_in;
 pub mod decoded;
 pub mod metrics;
 pub mod quality;
+pub mod report;
+pub mod study;
 pub mod sweep;
 pub mod texture_set;
+#[cfg(feature = "gpu")]
+pub mod twin_device;

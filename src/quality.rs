@@ -55,7 +55,9 @@ impl Quality {
             })
         };
         let per_mip = |channels: &[usize]| {
-            (0..mip_count).map(|mip| figures(channels, &[mip])).collect::<Result<Vec<_>, _>>()
+            (0..mip_count)
+                .map(|mip| figures(channels, &[mip]))
+                .collect::<Result<Vec<_>, _>>()
         };
         let all_mips: Vec<usize> = (0..mip_count).collect();
         let maps_measured = maps
@@ -69,7 +71,10 @@ impl Quality {
                 })
             })
             .collect::<Result<_, MetricsError>>()?;
-        let all: Vec<usize> = maps.iter().flat_map(|(_, channels)| channels.clone()).collect();
+        let all: Vec<usize> = maps
+            .iter()
+            .flat_map(|(_, channels)| channels.clone())
+            .collect();
         Ok(Quality {
             maps: maps_measured,
             mips: per_mip(&all)?,
@@ -87,7 +92,10 @@ pub fn maps_of(asset: &Asset) -> Vec<(String, Range<usize>)> {
         .iter()
         .map(|map| {
             let first = usize::from(map.first_channel);
-            (map.name.clone(), first..first + usize::from(map.channel_count))
+            (
+                map.name.clone(),
+                first..first + usize::from(map.channel_count),
+            )
         })
         .collect()
 }
@@ -97,5 +105,11 @@ pub fn maps_of(asset: &Asset) -> Vec<(String, Range<usize>)> {
 pub fn bppc(asset: &Asset) -> f64 {
     let shape = &asset.shape;
     let channels = shape.outputs.len();
-    metrics::bppc(asset.grid_bits(), asset.parameter_bits(), shape.width, shape.height, channels)
+    metrics::bppc(
+        asset.grid_bits(),
+        asset.parameter_bits(),
+        shape.width,
+        shape.height,
+        channels,
+    )
 }

@@ -51,7 +51,12 @@ pub fn narrow(asset: &Asset, latent_bits: u8, weight_bits: u8) -> Result<Asset, 
         let from = shape.format;
         let to = LatentFormat::new(latent_bits)
             .filter(|to| to.bits() <= from.bits())
-            .ok_or(SweepError::Width { what: "latent", found: latent_bits, low: 1, high: from.bits() })?;
+            .ok_or(SweepError::Width {
+                what: "latent",
+                found: latent_bits,
+                low: 1,
+                high: from.bits(),
+            })?;
         let shift = u32::from(from.bits() - to.bits());
         for code in codes {
             let value = Rounding::HalfUp.shift(i64::from(from.value(*code)), shift);
@@ -61,7 +66,12 @@ pub fn narrow(asset: &Asset, latent_bits: u8, weight_bits: u8) -> Result<Asset, 
     }
     let (low, high) = (limits::WEIGHT_BITS.0, parts.weight_bits);
     if weight_bits < low || weight_bits > high {
-        return Err(SweepError::Width { what: "weight", found: weight_bits, low, high });
+        return Err(SweepError::Width {
+            what: "weight",
+            found: weight_bits,
+            low,
+            high,
+        });
     }
     let shift = high - weight_bits;
     let largest = (1 << (weight_bits - 1)) - 1;
@@ -76,7 +86,10 @@ pub fn narrow(asset: &Asset, latent_bits: u8, weight_bits: u8) -> Result<Asset, 
         for scale in &mut layer.scales {
             *scale = scale
                 .times_power_of_two(shift)
-                .map_err(|source| SweepError::Scale { layer: index, source })?;
+                .map_err(|source| SweepError::Scale {
+                    layer: index,
+                    source,
+                })?;
         }
     }
     parts.weight_bits = weight_bits;
@@ -98,7 +111,13 @@ mod tests {
     fn a_width_above_the_assets_own_is_refused() {
         let asset = crate::built_in::asset().unwrap();
         let above = asset.shape.grids[0].format.bits() + 1;
-        assert!(matches!(narrow(&asset, above, 8), Err(SweepError::Width { what: "latent", .. })));
-        assert!(matches!(narrow(&asset, 1, 1), Err(SweepError::Width { what: "weight", .. })));
+        assert!(matches!(
+            narrow(&asset, above, 8),
+            Err(SweepError::Width { what: "latent", .. })
+        ));
+        assert!(matches!(
+            narrow(&asset, 1, 1),
+            Err(SweepError::Width { what: "weight", .. })
+        ));
     }
 }

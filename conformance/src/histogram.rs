@@ -54,7 +54,14 @@ impl Histogram {
         if self.worst.is_none() || distance > self.max {
             self.max = distance;
             let (x, y, mip) = (request.x(), request.y(), request.mip());
-            self.worst = Some(Worst { x, y, mip, channel, code, oracle });
+            self.worst = Some(Worst {
+                x,
+                y,
+                mip,
+                channel,
+                code,
+                oracle,
+            });
         }
     }
 
@@ -74,6 +81,10 @@ impl Histogram {
     /// The root mean square of |code − oracle|, in LSB; 0 where nothing was recorded.
     #[must_use]
     pub fn rms(&self) -> f64 {
-        if self.samples == 0 { 0.0 } else { (self.square_sum / self.samples as f64).sqrt() }
+        if self.samples == 0 {
+            0.0
+        } else {
+            (self.square_sum / self.samples as f64).sqrt()
+        }
     }
 }

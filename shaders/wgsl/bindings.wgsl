@@ -64,6 +64,14 @@ struct Row {
     shift: u32,
 }
 
+// The layers that this dispatch runs; the first dispatch also embeds, the last also emits.
+struct Part {
+    first_layer: u32,
+    end_layer: u32, // exclusive
+    reserved_0: u32,
+    reserved_1: u32,
+}
+
 @group(0) @binding(0) var<uniform> header: Header;
 @group(0) @binding(1) var<storage, read> requests: array<Request>;
 // Cells row after row, each with its channels' codes from the least significant bit, padded to a byte.
@@ -74,3 +82,7 @@ struct Row {
 @group(0) @binding(5) var<storage, read> weights: array<vec4<u32>>;
 // The channel codes: texel after texel.
 @group(0) @binding(6) var<storage, read_write> codes: array<i32>;
+// Binding 7 is in taps.wgsl.
+@group(0) @binding(8) var<uniform> part: Part;
+// Where the vectors wait between two dispatches: element after element, of each every texel's.
+@group(0) @binding(9) var<storage, read_write> waiting: array<vec4<u32>>;

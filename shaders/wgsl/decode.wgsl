@@ -9,16 +9,24 @@ fn decode(@builtin(global_invocation_id) id: vec3<u32>) {
     let request = requests[texel];
     tap_texel(texel);
 
+    if (part.first_layer == 0u) {
+        embed(request);
+    } else {
+        restore_vectors(texel);
+    }
+    for (var index = part.first_layer; index < part.end_layer; index++) {
+        run_layer(index, texel);
+    }
+    if (part.end_layer < header.layers_count) {
+        save_vectors(texel);
+    }
+}
+
+fn embed(request: Request) {
     let corners0 = position(0u, request);
     let corners1 = position(1u, request);
     var lane = concat(0u, corners0, 0u);
     lane = lerp(1u, corners1, lane);
     lane = waves(request, lane);
     lane = level(request, lane);
-
-    let last = header.layers_count - 1u;
-    for (var index = 0u; index < last; index++) {
-        hidden_layer(index);
-    }
-    emit(last, texel);
 }

@@ -15,14 +15,11 @@ fn lerp(grid: u32, corners: Corners, lane: u32) -> u32 {
     let channels = header.grids[grid].channels;
     let bits = header.grids[grid].bits;
     for (var channel = 0u; channel < channels; channel++) {
-        let values = vec4<i32>(
-            latent_value(fetch(grid, addresses.x, channel, 0u), bits),
-            latent_value(fetch(grid, addresses.y, channel, 1u), bits),
-            latent_value(fetch(grid, addresses.z, channel, 2u), bits),
-            latent_value(fetch(grid, addresses.w, channel, 3u), bits),
-        );
-        let products = weights * values;
-        let sum = products.x + products.y + products.z + products.w;
+        var sum = 0i;
+        for (var corner = 0u; corner < 4u; corner++) {
+            let code = fetch(grid, addresses[corner], channel, corner);
+            sum += weights[corner] * latent_value(code, bits);
+        }
         write_input(lane + channel, lerp_input(sum, bits, PROFILE_INPUT));
     }
     return lane + channels;

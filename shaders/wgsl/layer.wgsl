@@ -30,14 +30,13 @@ fn dense(layer: Layer, source: u32, row: u32) -> vec4<i32> {
     return sums;
 }
 
-// An accumulator after its activation, at the scale of the layer's output.
+// An accumulator after its activation, at the scale of the layer's output. A hard GELU has used
+// the row's multiplier for its argument; its product has one of its own.
 fn rescale(layer: Layer, row: Row, activated: i32) -> i32 {
-    if (layer.activation == ACTIVATION_HARD_GELU) {
-        return requantizer_apply(
-            PROFILE_REQUANTIZE, activated, layer.gate_mantissa, layer.gate_shift,
-        );
-    }
-    return requantizer_apply(PROFILE_REQUANTIZE, activated, row.mantissa, row.shift);
+    let is_gated = layer.activation == ACTIVATION_HARD_GELU;
+    let mantissa = select(row.mantissa, layer.gate_mantissa, is_gated);
+    let shift = select(row.shift, layer.gate_shift, is_gated);
+    return requantizer_apply(PROFILE_REQUANTIZE, activated, mantissa, shift);
 }
 
 // The skip path's term: its source's value without the source's zero point, rescaled.
@@ -54,37 +53,34 @@ fn to_activation(rescaled: i32, skip: i32, zero_point: i32) -> i32 {
     return clamp(sum, ACTIVATION_MIN - zero_point, ACTIVATION_MAX - zero_point) + zero_point;
 }
 
-// One row of a hidden layer, from accumulator to activation.
-fn finish(layer: Layer, row: u32, accumulator: i32, source: i32) -> i32 {
+// One row of hidden layer `index`, from accumulator to activation.
+fn finish(layer: Layer, index: u32, row: u32, accumulator: i32) {
     let parameters = rows[layer.row + row];
     let activated = activate(layer, parameters, accumulator);
     var skip = 0i;
     if (layer.skip_span != 0u) {
-        skip = skip_term(layer, source);
+        skip = skip_term(layer, read_lane(index + 1u - layer.skip_span, row));
     }
     let output = to_activation(rescale(layer, parameters, activated), skip, layer.zero_point);
-    if (row < layer.outputs) {
-        tap(layer.tap + row, accumulator);
-        tap(layer.tap + layer.outputs + row, activated);
-        tap(layer.tap + 2u * layer.outputs + row, output);
-    }
-    return output;
+    write_lane(index + 1u, row, output);
+    tap(layer.tap + row, accumulator);
+    tap(layer.tap + layer.outputs + row, activated);
+    tap(layer.tap + 2u * layer.outputs + row, output);
 }
 
-// A hidden layer: vector `index` and the skip path's source to vector `index + 1`.
-fn hidden_layer(index: u32) {
+// Layer `index`: vector `index` to vector `index + 1`, or in the last layer to the channel codes
+// of a texel. Rows past the last are computed with the others of their four, and dropped.
+fn run_layer(index: u32, texel: u32) {
     let layer = header.layers[index];
-    for (var row = 0u; row < layer.outputs; row += 4u) {
-        let sums = dense(layer, index, row);
-        var source = vec4<i32>(0);
-        if (layer.skip_span != 0u) {
-            source = read_quad(index + 1u - layer.skip_span, row);
+    let is_last = index + 1u == header.layers_count;
+    for (var first = 0u; first < layer.outputs; first += 4u) {
+        let sums = dense(layer, index, first);
+        for (var row = first; row < min(first + 4u, layer.outputs); row++) {
+            if (is_last) {
+                emit(layer, texel, row, sums[row - first]);
+            } else {
+                finish(layer, index, row, sums[row - first]);
+            }
         }
-        write_quad(index + 1u, row, vec4<i32>(
-            finish(layer, row, sums.x, source.x),
-            finish(layer, row + 1u, sums.y, source.y),
-            finish(layer, row + 2u, sums.z, source.z),
-            finish(layer, row + 3u, sums.w, source.w),
-        ));
     }
 }

@@ -14,28 +14,14 @@ fn output_range(format: u32) -> vec2<i32> {
     }
 }
 
-fn emit_channel(layer: Layer, texel: u32, channel: u32, accumulator: i32) {
-    if (channel >= header.channels) {
-        return;
-    }
+// One row of the last layer: the code of a texel's channel.
+fn emit(layer: Layer, texel: u32, channel: u32, accumulator: i32) {
     let row = rows[layer.row + channel];
     let range = output_range(header.outputs[channel >> 2u][channel & 3u]);
     let rescaled = requantizer_apply(PROFILE_OUTPUT, accumulator, row.mantissa, row.shift);
     let code = clamp(rescaled, range.x, range.y);
+    codes[texel * header.channels + channel] = code;
     tap(layer.tap + channel, accumulator);
     tap(layer.tap + layer.outputs + channel, accumulator);
     tap(header.tap_codes + channel, code);
-    codes[texel * header.channels + channel] = code;
-}
-
-// The last layer: vector `index` to the channel codes of a texel.
-fn emit(index: u32, texel: u32) {
-    let layer = header.layers[index];
-    for (var row = 0u; row < layer.outputs; row += 4u) {
-        let sums = dense(layer, index, row);
-        emit_channel(layer, texel, row, sums.x);
-        emit_channel(layer, texel, row + 1u, sums.y);
-        emit_channel(layer, texel, row + 2u, sums.z);
-        emit_channel(layer, texel, row + 3u, sums.w);
-    }
 }

@@ -20,20 +20,27 @@ fn write_lane(vector: u32, lane: u32, value: i32) {
     vectors[element][word] = others | ((bitcast<u32>(value) & 0xffu) << bit);
 }
 
-// Four lanes at once, from a lane that is a multiple of four.
-fn write_quad(vector: u32, lane: u32, values: vec4<i32>) {
-    let bytes = (bitcast<vec4<u32>>(values) & vec4<u32>(0xffu)) << vec4<u32>(0u, 8u, 16u, 24u);
-    let packed = bytes.x | bytes.y | bytes.z | bytes.w;
-    vectors[vector_start(vector) + (lane >> 4u)][(lane >> 2u) & 3u] = packed;
-}
-
-fn read_quad(vector: u32, lane: u32) -> vec4<i32> {
-    let packed = vectors[vector_start(vector) + (lane >> 4u)][(lane >> 2u) & 3u];
-    // Each byte goes to the top of its word, and comes down with its sign.
-    return bitcast<vec4<i32>>(vec4<u32>(packed) << vec4<u32>(24u, 16u, 8u, 0u)) >> vec4<u32>(24u);
+fn read_lane(vector: u32, lane: u32) -> i32 {
+    let word = vectors[vector_start(vector) + (lane >> 4u)][(lane >> 2u) & 3u];
+    return extractBits(bitcast<i32>(word), (lane & 3u) * 8u, 8u);
 }
 
 fn write_input(lane: u32, value: i32) {
     tap(header.tap_inputs + lane, value);
     write_lane(0u, lane, value);
+}
+
+// Puts the vectors away until the next dispatch.
+fn save_vectors(texel: u32) {
+    let texels = arrayLength(&requests);
+    for (var element = 0u; element < VECTOR_STEPS * VECTOR_COUNT; element++) {
+        waiting[element * texels + texel] = vectors[element];
+    }
+}
+
+fn restore_vectors(texel: u32) {
+    let texels = arrayLength(&requests);
+    for (var element = 0u; element < VECTOR_STEPS * VECTOR_COUNT; element++) {
+        vectors[element] = waiting[element * texels + texel];
+    }
 }

@@ -35,9 +35,16 @@ pub(crate) fn source_of(asset: &Asset, set: &TextureSet) -> anyhow::Result<Vec<A
         shape.height
     );
     let maps = |maps: Vec<(String, usize)>| {
-        maps.iter().map(|(n, c)| format!("{n} {c}")).collect::<Vec<_>>().join(", ")
+        maps.iter()
+            .map(|(n, c)| format!("{n} {c}"))
+            .collect::<Vec<_>>()
+            .join(", ")
     };
-    let found: Vec<_> = set.maps.iter().map(|m| (m.name.clone(), m.channel_count)).collect();
+    let found: Vec<_> = set
+        .maps
+        .iter()
+        .map(|m| (m.name.clone(), m.channel_count))
+        .collect();
     let allowed: Vec<_> = asset
         .metadata
         .maps
@@ -64,17 +71,29 @@ pub(crate) fn source_of(asset: &Asset, set: &TextureSet) -> anyhow::Result<Vec<A
 impl Compare {
     pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
         let set = TextureSet::read(&self.reference)?;
-        let is_asset = self.test.extension().is_some_and(|e| e.eq_ignore_ascii_case("ntx"));
+        let is_asset = self
+            .test
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("ntx"));
         let (reference, test, maps, rate) = if is_asset {
             let asset = files::read_asset(&self.test)?;
             let reference = source_of(&asset, &set)?;
             let bar = console::progress(asset.shape.texel_count(), "decoding");
             let test = Decoded::of(&asset, |done| bar.set_position(done)).reals(&asset.shape);
             bar.finish_and_clear();
-            (reference, test, quality::maps_of(&asset), Some(quality::bppc(&asset)))
+            (
+                reference,
+                test,
+                quality::maps_of(&asset),
+                Some(quality::bppc(&asset)),
+            )
         } else {
             let test = TextureSet::read(&self.test)?;
-            let maps = set.maps.iter().map(|m| (m.name.clone(), m.channels())).collect();
+            let maps = set
+                .maps
+                .iter()
+                .map(|m| (m.name.clone(), m.channels()))
+                .collect();
             (set.texels, test.texels, maps, None)
         };
         let quality = Quality::measure(&reference, &test, &maps)
@@ -84,11 +103,19 @@ impl Compare {
         } else {
             console::print(&table(&quality));
             if let Some(rate) = rate {
-                console::print(&format!("{rate:.4} bits per pixel and channel, parameters counted"));
+                console::print(&format!(
+                    "{rate:.4} bits per pixel and channel, parameters counted"
+                ));
             }
         }
-        let passes = self.min_psnr.is_none_or(|least| quality.overall.psnr >= least);
-        Ok(if passes { Verdict::Fine } else { Verdict::Failed })
+        let passes = self
+            .min_psnr
+            .is_none_or(|least| quality.overall.psnr >= least);
+        Ok(if passes {
+            Verdict::Fine
+        } else {
+            Verdict::Failed
+        })
     }
 }
 

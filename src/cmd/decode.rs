@@ -2,7 +2,7 @@
 
 use crate::Verdict;
 use crate::{console, files};
-use ndarray::s;
+use ndarray::{Axis, Slice};
 use ntmu::decoded::Decoded;
 use ntmu::isa::Asset;
 use ntmu::isa::asset::Map;
@@ -56,7 +56,11 @@ impl Decode {
         let asset = files::read_asset(&self.asset)?;
         let mip_count = asset.shape.mip_count;
         if let Some(mip) = self.mip {
-            anyhow::ensure!(mip < mip_count, "mip {mip}: the asset has mips 0..={}", mip_count - 1);
+            anyhow::ensure!(
+                mip < mip_count,
+                "mip {mip}: the asset has mips 0..={}",
+                mip_count - 1
+            );
         }
         let bar = console::progress(asset.shape.texel_count(), "decoding");
         let decoded = match self.mip {
@@ -70,7 +74,11 @@ impl Decode {
             console::print_json(&json!({ "written": written }))?;
         } else {
             console::print(
-                &written.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join("\n"),
+                &written
+                    .iter()
+                    .map(|p| p.display().to_string())
+                    .collect::<Vec<_>>()
+                    .join("\n"),
             );
         }
         Ok(Verdict::Fine)
@@ -88,15 +96,23 @@ fn write_all(
     let mut written = Vec::new();
     for (mip, texels) in (first_mip..).zip(decoded.reals(&asset.shape)) {
         // A folder holds images of one size, so that it can be read back as a texture set.
-        let folder = if is_chain { folder.join(format!("mip{mip}")) } else { folder.to_owned() };
+        let folder = if is_chain {
+            folder.join(format!("mip{mip}"))
+        } else {
+            folder.to_owned()
+        };
         files::make_folder(&folder)?;
         for map in &asset.metadata.maps {
             let depth = depth.unwrap_or(stored_depth(map));
-            let channels = usize::from(map.first_channel)
-                ..usize::from(map.first_channel + map.channel_count);
+            let channels =
+                usize::from(map.first_channel)..usize::from(map.first_channel + map.channel_count);
             let extension = depth.extension();
             let path = folder.join(format!("{}.{extension}", map.name));
-            write_map(&path, &texels.slice(s![channels, .., ..]), depth)?;
+            write_map(
+                &path,
+                &texels.slice_axis(Axis(0), Slice::from(channels)),
+                depth,
+            )?;
             written.push(path);
         }
     }

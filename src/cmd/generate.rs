@@ -2,7 +2,7 @@
 
 use crate::Verdict;
 use crate::{console, files};
-use ndarray::s;
+use ndarray::{Axis, Slice};
 use ntmu::texture_set::{Depth, write_map};
 use ntmu::{brick_wall, built_in};
 use serde_json::json;
@@ -24,7 +24,9 @@ pub(crate) struct Generate {
 fn size(text: &str) -> Result<u32, String> {
     match text.parse::<u32>() {
         Ok(size) if size.is_power_of_two() && (64..=4096).contains(&size) => Ok(size),
-        Ok(_) | Err(_) => Err(format!("found {text:?}; allowed: a power of two in 64..=4096")),
+        Ok(_) | Err(_) => Err(format!(
+            "found {text:?}; allowed: a power of two in 64..=4096"
+        )),
     }
 }
 
@@ -35,7 +37,11 @@ impl Generate {
         let mut written = Vec::new();
         for map in &set.maps {
             let path = self.output.join(format!("{}.png", map.name));
-            write_map(&path, &set.texels[0].slice(s![map.channels(), .., ..]), Depth::Eight)?;
+            write_map(
+                &path,
+                &set.texels[0].slice_axis(Axis(0), Slice::from(map.channels())),
+                Depth::Eight,
+            )?;
             written.push(path);
         }
         if json {

@@ -83,20 +83,40 @@ fn print(asset: &Asset) {
         facts.add_row([name.to_owned(), value, unit.to_owned()]);
     };
     fact("name", asset.metadata.name.clone(), "");
-    fact("size", format!("{} × {}", shape.width, shape.height), "texels");
+    fact(
+        "size",
+        format!("{} × {}", shape.width, shape.height),
+        "texels",
+    );
     fact("mips", shape.mip_count.to_string(), "");
     fact("channels", shape.channel_count().to_string(), "");
     for g in 0..2 {
         let (width, height) = shape.grid_size(g);
         let grid = shape.grids[g];
         let size = format!("{width} × {height} × {}", grid.channels);
-        fact(&format!("grid {g}"), size, &format!("latents of {} bits", grid.format.bits()));
+        fact(
+            &format!("grid {g}"),
+            size,
+            &format!("latents of {} bits", grid.format.bits()),
+        );
     }
-    fact("synthesizer", asset.macs().to_string(), "multiplications per texel");
+    fact(
+        "synthesizer",
+        asset.macs().to_string(),
+        "multiplications per texel",
+    );
     fact("weights", asset.weight_bits.to_string(), "bits");
     fact("grids", asset.grid_bits().div_ceil(8).to_string(), "bytes");
-    fact("parameters", asset.parameter_bits().div_ceil(8).to_string(), "bytes");
-    fact("rate", format!("{:.4}", ntmu::quality::bppc(asset)), "bits per pixel and channel");
+    fact(
+        "parameters",
+        asset.parameter_bits().div_ceil(8).to_string(),
+        "bytes",
+    );
+    fact(
+        "rate",
+        format!("{:.4}", ntmu::quality::bppc(asset)),
+        "bits per pixel and channel",
+    );
     fact("corner snap", shape.snap.name().to_owned(), "");
     fact("address mode", shape.address_mode.name().to_owned(), "");
     console::print(&facts.to_string());
@@ -106,13 +126,27 @@ fn print(asset: &Asset) {
         let last = map.first_channel + map.channel_count - 1;
         let channels = format!("{}..={last}", map.first_channel);
         let encoding = map.encoding.name().to_owned();
-        maps.add_row([map.name.clone(), channels, encoding, map.bit_depth.to_string()]);
+        maps.add_row([
+            map.name.clone(),
+            channels,
+            encoding,
+            map.bit_depth.to_string(),
+        ]);
     }
     console::print(&maps.to_string());
 
-    let mut layers = console::table(&["layer", "in", "out", "activation", "zero point", "skip from"]);
+    let mut layers = console::table(&[
+        "layer",
+        "in",
+        "out",
+        "activation",
+        "zero point",
+        "skip from",
+    ]);
     for (index, layer) in asset.layers.iter().enumerate() {
-        let skip = layer.skip.map_or("".to_owned(), |s| (index - usize::from(s.span)).to_string());
+        let skip = layer
+            .skip
+            .map_or("".to_owned(), |s| (index - usize::from(s.span)).to_string());
         layers.add_row([
             index.to_string(),
             layer.inputs.to_string(),

@@ -49,8 +49,11 @@ impl Program {
                 Microprogram::link(&asset, layout, instructions).with_context(context)?
             }
         };
-        let lines: Vec<_> =
-            program.instructions().iter().map(|i| (i.encode(), assembly::disassemble(i))).collect();
+        let lines: Vec<_> = program
+            .instructions()
+            .iter()
+            .map(|i| (i.encode(), assembly::disassemble(i)))
+            .collect();
         if json {
             let instructions: Vec<_> = lines
                 .iter()

@@ -113,7 +113,12 @@ fn rows<T: std::fmt::Display>(numbers: &[T], width: usize) -> String {
 
 fn print(asset: &Asset, taps: &Taps) {
     let request = taps.request;
-    let mut text = format!("texel ({}, {}) of mip {}\n", request.x(), request.y(), request.mip());
+    let mut text = format!(
+        "texel ({}, {}) of mip {}\n",
+        request.x(),
+        request.y(),
+        request.mip()
+    );
     for (g, tap) in taps.grids.iter().enumerate() {
         let shape = asset.shape.grids[g];
         let (x, y) = (tap.corners.x, tap.corners.y);
@@ -122,8 +127,13 @@ fn print(asset: &Asset, taps: &Taps) {
             x.first, y.first, x.stride, x.phase, y.phase
         ));
         let codes = tap.codes.chunks(usize::from(shape.channels));
-        for (c, ((cell, weight), codes)) in
-            tap.corners.cells().iter().zip(tap.corners.weights()).zip(codes).enumerate()
+        for (c, ((cell, weight), codes)) in tap
+            .corners
+            .cells()
+            .iter()
+            .zip(tap.corners.weights())
+            .zip(codes)
+            .enumerate()
         {
             let address = tap.fetch.map_or(0, |f| f.addresses[c]);
             text.push_str(&format!(
@@ -134,7 +144,10 @@ fn print(asset: &Asset, taps: &Taps) {
             ));
         }
     }
-    text.push_str(&format!("\ninputs, real = value/128\n{}", rows(&taps.inputs, 4)));
+    text.push_str(&format!(
+        "\ninputs, real = value/128\n{}",
+        rows(&taps.inputs, 4)
+    ));
     for tap in &taps.layers {
         let layer = &asset.layers[usize::from(tap.layer)];
         let activation = layer.activation.name();
@@ -151,7 +164,10 @@ fn print(asset: &Asset, taps: &Taps) {
         if !tap.outputs.is_empty() {
             let zero_point = layer.zero_point;
             let skip = layer.skip.map_or(String::new(), |s| {
-                format!(", with the skip path from layer {}", usize::from(tap.layer) - usize::from(s.span))
+                format!(
+                    ", with the skip path from layer {}",
+                    usize::from(tap.layer) - usize::from(s.span)
+                )
             });
             text.push_str(&format!(" outputs, zero at {zero_point}{skip}\n"));
             text.push_str(&rows(&tap.outputs, 4));

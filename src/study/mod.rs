@@ -6,11 +6,13 @@ mod oracle;
 mod sweep;
 mod timing;
 mod twin;
+mod vectors;
 
 pub use oracle::{OracleStudy, compare_with_oracle};
-pub use sweep::{SweepPoint, sweep};
-pub use timing::{Charge, TimingRow, simulate};
+pub use sweep::{SweepPoint, SweepStudyError, sweep, sweep_points};
+pub use timing::{Charge, TimingRow, simulate, timing_points};
 pub use twin::{TwinStudy, compare_with_twin};
+pub use vectors::vectors;
 
 use crate::quality::{self, Quality};
 use ntmu_isa::Asset;

@@ -32,7 +32,7 @@ pub enum SweepStudyError {
     Metrics(#[from] MetricsError),
 }
 
-/// Decodes the asset at up to four latent widths and up to four weight widths, from its own down,
+/// Decodes the asset at up to four latent widths and up to three weight widths, from its own down,
 /// and compares each with the source. `after_point` is called with the points done.
 ///
 /// # Errors
@@ -44,20 +44,39 @@ pub fn sweep(
 ) -> Result<Vec<SweepPoint>, SweepStudyError> {
     let channels: Vec<usize> = (0..asset.shape.outputs.len()).collect();
     let mips: Vec<usize> = (0..reference.len()).collect();
-    let widest = asset.shape.grids[0].format.bits().min(asset.shape.grids[1].format.bits());
     let mut points = Vec::new();
-    for latent_bits in (1..=widest).rev().take(4) {
-        for weight_bits in (2..=asset.weight_bits).rev().step_by(2).take(3) {
-            let narrowed = narrow(asset, latent_bits, weight_bits)?;
-            let reals = Decoded::of(&narrowed, |_| ()).reals(&narrowed.shape);
-            points.push(SweepPoint {
-                latent_bits,
-                weight_bits,
-                psnr: metrics::psnr(reference, &reals, &channels, &mips)?,
-                bppc: quality::bppc(&narrowed),
-            });
-            after_point(points.len() as u64);
-        }
+    for (latent_bits, weight_bits) in widths(asset) {
+        let narrowed = narrow(asset, latent_bits, weight_bits)?;
+        let reals = Decoded::of(&narrowed, |_| ()).reals(&narrowed.shape);
+        points.push(SweepPoint {
+            latent_bits,
+            weight_bits,
+            psnr: metrics::psnr(reference, &reals, &channels, &mips)?,
+            bppc: quality::bppc(&narrowed),
+        });
+        after_point(points.len() as u64);
     }
     Ok(points)
+}
+
+/// Points of [`sweep`].
+#[must_use]
+pub fn sweep_points(asset: &Asset) -> u64 {
+    widths(asset).count() as u64
+}
+
+fn widths(asset: &Asset) -> impl Iterator<Item = (u8, u8)> + use<> {
+    let widest = asset.shape.grids[0]
+        .format
+        .bits()
+        .min(asset.shape.grids[1].format.bits());
+    let weights = asset.weight_bits;
+    let latent_widths = (1..=widest).rev().take(4);
+    latent_widths.flat_map(move |latent| {
+        (2..=weights)
+            .rev()
+            .step_by(2)
+            .take(3)
+            .map(move |weight| (latent, weight))
+    })
 }

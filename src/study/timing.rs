@@ -1,6 +1,13 @@
 //! The units' cycles for the whole chain of an asset.
 
+use ntmu_isa::layout::Layout;
+use ntmu_isa::{Asset, Program};
+use ntmu_model::Request;
+use ntmu_model::exec::Decoder;
+use ntmu_model::time::{self, Unit};
+use rayon::prelude::*;
 use serde::Serialize;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Cycles charged to one cause.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -38,4 +45,60 @@ pub struct TimingRow {
     pub bottleneck: String,
     /// Where the cycles went; the sum is `cycles`.
     pub ledger: Vec<Charge>,
+}
+
+/// Runs every preset with every layout on every texel of every mip, mip after mip in texel-block
+/// order, the cache cold at the start. `after_point` is called with the runs done.
+#[must_use]
+pub fn simulate(asset: &Asset, after_point: impl Fn(u64) + Sync) -> Vec<TimingRow> {
+    let mips = 0..asset.shape.mip_count;
+    let requests: Vec<Request> = mips
+        .flat_map(|mip| Request::blocks(&asset.shape, mip))
+        .collect();
+    let runs: Vec<(Unit, Layout)> = Unit::presets()
+        .into_iter()
+        .flat_map(|unit| Layout::ALL.map(|layout| (unit.clone(), layout)))
+        .collect();
+    let done = AtomicU64::new(0);
+    runs.par_iter()
+        .map(|(unit, layout)| {
+            let row = simulate_one(asset, unit, *layout, &requests);
+            after_point(done.fetch_add(1, Ordering::Relaxed) + 1);
+            row
+        })
+        .collect()
+}
+
+/// Runs of [`simulate`].
+#[must_use]
+pub fn timing_points() -> u64 {
+    (Unit::presets().len() * Layout::ALL.len()) as u64
+}
+
+fn simulate_one(asset: &Asset, unit: &Unit, layout: Layout, requests: &[Request]) -> TimingRow {
+    let program = Program::compile(asset, layout);
+    let trace = Decoder::new(asset, &program).trace(requests.iter().copied());
+    let timing = time::simulate(unit, asset, &program, &trace);
+    let blocks = timing.blocks;
+    TimingRow {
+        unit: unit.name().to_owned(),
+        layout: layout.name().to_owned(),
+        texels: timing.texels,
+        cycles: timing.cycles,
+        cycles_per_block: timing.cycles_per_block,
+        closed_form_per_block: timing.closed_form.cycles as f64 / blocks,
+        bytes_per_block: timing.bytes_per_block,
+        hit_rate: timing.hit_rate,
+        mac_utilisation: timing.mac_utilisation,
+        mtexels_per_second: timing.megatexels_per_second,
+        bottleneck: timing.bottleneck.name().to_owned(),
+        ledger: timing
+            .ledger
+            .entries()
+            .map(|(cause, cycles)| Charge {
+                cause: cause.name().to_owned(),
+                cycles,
+            })
+            .collect(),
+    }
 }

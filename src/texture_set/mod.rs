@@ -20,6 +20,7 @@ mod write;
 
 pub use error::TextureSetError;
 pub use mips::{mip_chain, mip_count};
+pub use ntmu_isa::asset::Encoding;
 pub use write::{Depth, WriteMapError, write_map};
 
 /// Most channels a set may have: the widest output the synthesizer is specified for.
@@ -63,19 +64,6 @@ pub struct Map {
     pub bit_depth: u8,
     /// What the codes stand for.
     pub encoding: Encoding,
-}
-
-/// What the stored codes of a map stand for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Encoding {
-    /// Colour with the sRGB transfer function.
-    Srgb,
-    /// A quantity proportional to the code.
-    Linear,
-    /// Tangent-space normal, green up (OpenGL, glTF).
-    NormalGl,
-    /// Tangent-space normal, green down (DirectX).
-    NormalDx,
 }
 
 /// A file that was found beside the maps and left out.

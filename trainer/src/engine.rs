@@ -72,7 +72,7 @@ impl Engine {
             .zip(c0.par_chunks_mut(len).zip(c1.par_chunks_mut(len)))
             .zip(weights.par_chunks_mut(len).zip(gradient.par_chunks_mut(len * self.inputs)))
             .for_each(|(((chunk, texels), (c0, c1)), (weights, gradient))| {
-                vectorised(Pass { view, scale, chunk, texels, corners: [c0, c1], weights, gradient });
+                Pass { view, scale, chunk, texels, corners: [c0, c1], weights, gradient }.run();
             });
         let (first, rest) = self.chunks.split_at(1);
         let sums = first.iter().map(|c| &c.gradient);
@@ -106,9 +106,8 @@ struct Pass<'a> {
     gradient: &'a mut [f32],
 }
 
-impl Vectorised for Pass<'_> {
-    #[inline(always)]
-    fn run<const FUSED: bool>(self) {
+impl Pass<'_> {
+    fn run(self) {
         let Pass { view, scale, chunk, texels, corners: [c0, c1], weights, gradient } = self;
         let Chunk { workspace, targets, gradient: sum, error } = chunk;
         sum.fill(0.0);
@@ -118,19 +117,36 @@ impl Vectorised for Pass<'_> {
         let tiles = texels.chunks(TILE).zip(gradient.chunks_mut(TILE * width));
         let corners = c0.chunks_mut(TILE).zip(c1.chunks_mut(TILE)).zip(weights.chunks_mut(TILE));
         for ((texels, gradient), ((c0, c1), weights)) in tiles.zip(corners) {
-            let rows = workspace.inputs.chunks_exact_mut(width).zip(targets.chunks_exact_mut(channels));
-            for (i, ((row, target), &texel)) in rows.zip(texels).enumerate() {
-                let embedding = view.embedding;
-                embedding.gather(view.positions, view.windows, texel, view.seen, row);
-                let (corners, lerp) = embedding.corners(view.positions, view.windows, texel);
+            vectorised(GatherTile { view, texels, inputs: &mut workspace.inputs, width });
+            for (i, (target, &texel)) in targets.chunks_exact_mut(channels).zip(texels).enumerate() {
+                let (corners, lerp) = view.embedding.corners(view.positions, view.windows, texel);
                 c0[i] = corners[0].map(|at| at as u32);
                 c1[i] = corners[1].map(|at| at as u32);
                 weights[i] = lerp;
                 target.copy_from_slice(view.texels.texel(texel.x, texel.y, texel.mip));
             }
-            workspace.forward::<FUSED>(view.network);
+            workspace.forward(view.network);
             *error += workspace.compare(view.network, targets, scale);
-            workspace.backward::<FUSED>(view.network, sum, gradient);
+            workspace.backward(view.network, sum, gradient);
+        }
+    }
+}
+
+/// The inputs of a tile's texels.
+pub(crate) struct GatherTile<'a> {
+    pub(crate) view: View<'a>,
+    pub(crate) texels: &'a [Texel],
+    pub(crate) inputs: &'a mut [f32],
+    /// Padded inputs.
+    pub(crate) width: usize,
+}
+
+impl Vectorised for GatherTile<'_> {
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        let GatherTile { view, texels, inputs, width } = self;
+        for (row, &texel) in inputs.chunks_exact_mut(width).zip(texels) {
+            view.embedding.gather(view.positions, view.windows, texel, view.seen, row);
         }
     }
 }

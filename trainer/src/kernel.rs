@@ -56,10 +56,14 @@ pub(crate) fn multiply_add<const FUSED: bool>(a: f32, b: f32, c: f32) -> f32 {
 
 type Accumulators<const N: usize> = [[[f32; LANES]; N]; ROWS];
 
+/// `N` vectors of a row. Plain loops: a closure here may end up outside the dispatched function,
+/// and then the tile lives in memory instead of registers.
 #[inline(always)]
-fn vector(slice: &[f32], at: usize) -> [f32; LANES] {
-    let mut out = [0.0; LANES];
-    out.copy_from_slice(&slice[at..at + LANES]);
+fn vectors<const N: usize>(row: &[f32]) -> [[f32; LANES]; N] {
+    let mut out = [[0.0; LANES]; N];
+    for v in 0..N {
+        out[v].copy_from_slice(&row[v * LANES..(v + 1) * LANES]);
+    }
     out
 }
 
@@ -72,117 +76,138 @@ fn accumulate<const FUSED: bool>(x: f32, b: &[f32; LANES], mut c: [f32; LANES]) 
 }
 
 #[inline(always)]
-fn store<const N: usize, const ADD: bool>(acc: &Accumulators<N>, c: &mut [f32], stride: usize) {
-    for (row, acc) in c.chunks_mut(stride).zip(acc) {
-        for (v, acc) in acc.iter().enumerate() {
+fn store<const N: usize>(acc: &Accumulators<N>, c: &mut [f32], stride: usize, add: bool) {
+    for r in 0..ROWS {
+        let row = &mut c[r * stride..r * stride + N * LANES];
+        for v in 0..N {
             let out = &mut row[v * LANES..(v + 1) * LANES];
-            for i in 0..LANES {
-                out[i] = if ADD { out[i] + acc[i] } else { acc[i] };
-            }
-        }
-    }
-}
-
-/// `ROWS` rows and `N` vectors of columns of `A·B`; `A` is rows × depth.
-#[inline(always)]
-fn tile<const FUSED: bool, const N: usize, const ADD: bool>(
-    depth: usize,
-    a: (&[f32], usize),
-    b: (&[f32], usize),
-    c: (&mut [f32], usize),
-) {
-    let mut acc: Accumulators<N> = [[[0.0; LANES]; N]; ROWS];
-    let rows: [&[f32]; ROWS] = std::array::from_fn(|r| &a.0[r * a.1..r * a.1 + depth]);
-    for (k, b_row) in b.0.chunks(b.1).take(depth).enumerate() {
-        let b_row: [[f32; LANES]; N] = std::array::from_fn(|v| vector(b_row, v * LANES));
-        for r in 0..ROWS {
-            let x = rows[r][k];
-            for v in 0..N {
-                acc[r][v] = accumulate::<FUSED>(x, &b_row[v], acc[r][v]);
-            }
-        }
-    }
-    store::<N, ADD>(&acc, c.0, c.1);
-}
-
-/// `ROWS` rows and `N` vectors of columns of `Aᵀ·B`; `A` is depth × rows.
-#[inline(always)]
-fn tile_transposed<const FUSED: bool, const N: usize>(
-    a: (&[f32], usize),
-    b: (&[f32], usize),
-    c: (&mut [f32], usize),
-) {
-    let mut acc: Accumulators<N> = [[[0.0; LANES]; N]; ROWS];
-    for (a_row, b_row) in a.0.chunks(a.1).zip(b.0.chunks(b.1)) {
-        let mut xs = [0.0; ROWS];
-        xs.copy_from_slice(&a_row[..ROWS]);
-        let b_row: [[f32; LANES]; N] = std::array::from_fn(|v| vector(b_row, v * LANES));
-        for r in 0..ROWS {
-            for v in 0..N {
-                acc[r][v] = accumulate::<FUSED>(xs[r], &b_row[v], acc[r][v]);
-            }
-        }
-    }
-    store::<N, true>(&acc, c.0, c.1);
-}
-
-/// Calls `$tile` for blocks of columns: two vectors at a time, three where that leaves none over.
-macro_rules! for_columns {
-    ($columns:expr, |$at:ident, $n:ident| $body:expr) => {
-        let mut $at = 0;
-        while $at < $columns {
-            let left = ($columns - $at) / LANES;
-            if left == 1 {
-                const $n: usize = 1;
-                $body;
-                $at += LANES;
-            } else if left == 3 {
-                const $n: usize = 3;
-                $body;
-                $at += 3 * LANES;
+            if add {
+                for i in 0..LANES {
+                    out[i] += acc[r][v][i];
+                }
             } else {
-                const $n: usize = 2;
-                $body;
-                $at += 2 * LANES;
+                out.copy_from_slice(&acc[r][v]);
             }
         }
-    };
+    }
 }
 
-/// `C = A·B`, or `C += A·B` with `ADD`: `A` is rows × depth, `B` depth × columns.
-///
-/// `depth` may be less than `A`'s row length `a_stride`: what lies beyond is not read.
-#[inline(always)]
-pub(crate) fn product<const FUSED: bool, const ADD: bool>(
+/// `C = A·B`, or `C += A·B` with `add`: `A` is rows × depth, `B` depth × columns.
+struct Product<'a, const N: usize> {
+    a: &'a [f32],
+    /// Floats between two rows of `A`; only the first `depth` of them are read.
+    a_stride: usize,
+    b: &'a [f32],
+    /// Floats of a row of `B` and of `C`.
+    stride: usize,
+    c: &'a mut [f32],
+    depth: usize,
+    add: bool,
+}
+
+impl<const N: usize> Vectorised for Product<'_, N> {
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        let Product { a, a_stride, b, stride, c, depth, add } = self;
+        for (a, c) in a.chunks(a_stride * ROWS).zip(c.chunks_mut(stride * ROWS)) {
+            let mut rows: [&[f32]; ROWS] = [&[]; ROWS];
+            for r in 0..ROWS {
+                rows[r] = &a[r * a_stride..r * a_stride + depth];
+            }
+            let mut acc: Accumulators<N> = [[[0.0; LANES]; N]; ROWS];
+            for (k, b_row) in b.chunks(stride).take(depth).enumerate() {
+                let b_row = vectors::<N>(b_row);
+                for r in 0..ROWS {
+                    let x = rows[r][k];
+                    for v in 0..N {
+                        acc[r][v] = accumulate::<FUSED>(x, &b_row[v], acc[r][v]);
+                    }
+                }
+            }
+            store(&acc, c, stride, add);
+        }
+    }
+}
+
+/// `C += Aᵀ·B`: `A` is depth × rows, `B` depth × columns.
+struct Transposed<'a, const N: usize> {
+    a: &'a [f32],
+    rows: usize,
+    b: &'a [f32],
+    stride: usize,
+    c: &'a mut [f32],
+}
+
+impl<const N: usize> Vectorised for Transposed<'_, N> {
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        let Transposed { a, rows, b, stride, c } = self;
+        for (row, c) in (0..rows).step_by(ROWS).zip(c.chunks_mut(stride * ROWS)) {
+            let mut acc: Accumulators<N> = [[[0.0; LANES]; N]; ROWS];
+            for (a_row, b_row) in a[row..].chunks(rows).zip(b.chunks(stride)) {
+                let mut xs = [0.0; ROWS];
+                xs.copy_from_slice(&a_row[..ROWS]);
+                let b_row = vectors::<N>(b_row);
+                for r in 0..ROWS {
+                    for v in 0..N {
+                        acc[r][v] = accumulate::<FUSED>(xs[r], &b_row[v], acc[r][v]);
+                    }
+                }
+            }
+            store(&acc, c, stride, true);
+        }
+    }
+}
+
+/// Vectors of the next block of columns, of `left` that remain: two at a time, three where that
+/// leaves none over.
+const fn block(left: usize) -> usize {
+    match left {
+        1 => 1,
+        3 => 3,
+        _ => 2,
+    }
+}
+
+/// `C = A·B`, or `C += A·B` with `add`: `A` is rows × `a_stride`, of which the first `depth`
+/// columns count; `B` is depth × `columns` and `C` rows × `columns`.
+pub(crate) fn product(
     (a, a_stride): (&[f32], usize),
     b: &[f32],
     c: &mut [f32],
     depth: usize,
     columns: usize,
+    add: bool,
 ) {
-    for (a, c) in a.chunks(a_stride * ROWS).zip(c.chunks_mut(columns * ROWS)) {
-        for_columns!(columns, |at, N| tile::<FUSED, N, ADD>(
-            depth,
-            (a, a_stride),
-            (&b[at..], columns),
-            (&mut c[at..], columns)
-        ));
+    let mut at = 0;
+    while at < columns {
+        let (b, c, stride) = (&b[at..], &mut c[at..], columns);
+        let n = block((columns - at) / LANES);
+        match n {
+            1 => vectorised(Product::<1> { a, a_stride, b, stride, c, depth, add }),
+            3 => vectorised(Product::<3> { a, a_stride, b, stride, c, depth, add }),
+            _ => vectorised(Product::<2> { a, a_stride, b, stride, c, depth, add }),
+        }
+        at += n * LANES;
     }
 }
 
-/// `C += Aᵀ·B`: `A` is depth × rows, `B` depth × columns.
-#[inline(always)]
-pub(crate) fn product_transposed<const FUSED: bool>(
+/// `C += Aᵀ·B`: `A` is depth × `rows`, `B` depth × `columns`, `C` rows × columns.
+pub(crate) fn product_transposed(
     (a, rows): (&[f32], usize),
     (b, columns): (&[f32], usize),
     c: &mut [f32],
 ) {
-    for (row, c) in (0..rows).step_by(ROWS).zip(c.chunks_mut(columns * ROWS)) {
-        for_columns!(columns, |at, N| tile_transposed::<FUSED, N>(
-            (&a[row..], rows),
-            (&b[at..], columns),
-            (&mut c[at..], columns)
-        ));
+    let mut at = 0;
+    while at < columns {
+        let (b, c, stride) = (&b[at..], &mut c[at..], columns);
+        let n = block((columns - at) / LANES);
+        match n {
+            1 => vectorised(Transposed::<1> { a, rows, b, stride, c }),
+            3 => vectorised(Transposed::<3> { a, rows, b, stride, c }),
+            _ => vectorised(Transposed::<2> { a, rows, b, stride, c }),
+        }
+        at += n * LANES;
     }
 }
 
@@ -197,25 +222,6 @@ mod tests {
         (0..len as u64).map(|i| stream.below(i, 17) as f32 - 8.0).collect()
     }
 
-    struct Both<'a> {
-        a: &'a [f32],
-        b: &'a [f32],
-        plain: &'a mut [f32],
-        transposed: &'a mut [f32],
-        shape: (usize, usize, usize),
-    }
-
-    impl Vectorised for Both<'_> {
-        #[inline(always)]
-        fn run<const FUSED: bool>(self) {
-            let (rows, depth, columns) = self.shape;
-            product::<FUSED, false>((self.a, depth), self.b, self.plain, depth, columns);
-            // Aᵀ·C with C = A·B, on top of what is there.
-            product_transposed::<FUSED>((self.a, depth), (self.plain, columns), self.transposed);
-            assert_eq!(self.plain.len(), rows * columns);
-        }
-    }
-
     #[test]
     fn products_equal_the_definition_at_every_column_count() {
         for columns in [16, 32, 48, 64, 80, 128] {
@@ -223,13 +229,12 @@ mod tests {
             let (a, b) = (matrix(1, rows * depth), matrix(2, depth * columns));
             let mut plain = vec![9.0; rows * columns];
             let mut transposed = vec![1.0; depth * columns];
-            vectorised(Both {
-                a: &a,
-                b: &b,
-                plain: &mut plain,
-                transposed: &mut transposed,
-                shape: (rows, depth, columns),
-            });
+            product((&a, depth), &b, &mut plain, depth, columns, false);
+            // Aᵀ·C with C = A·B, on top of what is there.
+            product_transposed((&a, depth), (&plain, columns), &mut transposed);
+            let mut twice = plain.clone();
+            product((&a, depth), &b, &mut twice, depth, columns, true);
+            assert!(twice.iter().zip(&plain).all(|(t, p)| *t == 2.0 * p));
             for r in 0..rows {
                 for c in 0..columns {
                     let sum: f32 = (0..depth).map(|k| a[r * depth + k] * b[k * columns + c]).sum();

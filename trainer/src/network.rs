@@ -6,6 +6,7 @@
 //! [`crate::integer`]), so its products and sums are exact.
 
 use crate::config::ActivationKind;
+use crate::kernel::{Vectorised, vectorised};
 use crate::topology::{LayerShape, Topology};
 use ntmu_isa::activation::{GATE_FRACTION_BITS, GATE_RANGE};
 use ntmu_isa::embed::ACTIVATION_RANGE;
@@ -96,7 +97,6 @@ impl Prepared {
     /// of an output by its accumulator (where a skip path ends: by the sum before saturation).
     ///
     /// Integer outputs are kept without their zero point: value − zero_point.
-    #[inline(always)]
     pub(crate) fn finish(
         &self,
         activation: ActivationKind,
@@ -104,135 +104,42 @@ impl Prepared {
         out: &mut [f32],
         slope: &mut [f32],
     ) {
+        let bias = self.bias.as_slice();
         match &self.epilogue {
-            Epilogue::Real => self.finish_real(activation, source, out, slope),
-            Epilogue::Integer(rescaling) => {
-                self.finish_integer(rescaling, activation, source, out, slope);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn finish_real(
-        &self,
-        activation: ActivationKind,
-        source: Option<&[f32]>,
-        out: &mut [f32],
-        slope: &mut [f32],
-    ) {
-        if let Some(source) = source {
-            let columns = self.bias.len();
-            let rows = out.chunks_exact_mut(columns).zip(source.chunks_exact(columns));
-            for (out, source) in rows {
-                for ((out, source), bias) in out.iter_mut().zip(source).zip(&self.bias) {
-                    *out += bias + source;
+            Epilogue::Real => match source {
+                Some(source) => vectorised(RealSkip { bias, source, out, slope }),
+                None if !self.shape.activated => each(RealIdentity, bias, out, slope),
+                None => match activation {
+                    ActivationKind::Relu => each(RealLeaky(0.0), bias, out, slope),
+                    ActivationKind::Leaky { shift } => {
+                        each(RealLeaky(1.0 / f32::from(1_u8 << shift)), bias, out, slope);
+                    }
+                    ActivationKind::HardGelu => each(RealGelu, bias, out, slope),
+                },
+            },
+            Epilogue::Integer(r) => {
+                let scales = &r.scales[..bias.len()];
+                let saturation = Saturation { zero: r.zero_point };
+                if let Some(source) = source {
+                    vectorised(IntegerSkip { bias, scales, skip: r.skip, saturation, source, out, slope });
+                } else if !r.codes.is_empty() {
+                    each(IntegerCodes { scales, codes: &r.codes[..bias.len()] }, bias, out, slope);
+                } else if !self.shape.activated {
+                    each(IntegerLeaky { scales, saturation, leak: 1.0 }, bias, out, slope);
+                } else {
+                    match activation {
+                        ActivationKind::Relu => {
+                            each(IntegerLeaky { scales, saturation, leak: 0.0 }, bias, out, slope);
+                        }
+                        ActivationKind::Leaky { shift } => {
+                            let leak = 1.0 / f64::from(1_u8 << shift);
+                            each(IntegerLeaky { scales, saturation, leak }, bias, out, slope);
+                        }
+                        ActivationKind::HardGelu => {
+                            each(IntegerGelu { scales, saturation, gate: r.gate }, bias, out, slope);
+                        }
+                    }
                 }
-            }
-            slope.fill(1.0);
-            return;
-        }
-        if !self.shape.activated {
-            self.each(out, slope, |v, _| (v, 1.0));
-            return;
-        }
-        match activation {
-            ActivationKind::Relu => {
-                self.each(out, slope, |v, _| if v > 0.0 { (v, 1.0) } else { (0.0, 0.0) });
-            }
-            ActivationKind::Leaky { shift } => {
-                let leak = 1.0 / f32::from(1_u8 << shift);
-                self.each(out, slope, |v, _| if v >= 0.0 { (v, 1.0) } else { (v * leak, leak) });
-            }
-            ActivationKind::HardGelu => self.each(out, slope, |v, _| {
-                let gate = (v * (1.0 / 3.0) + 0.5).clamp(0.0, 1.0);
-                let inner = if gate > 0.0 && gate < 1.0 { v * (1.0 / 3.0) } else { 0.0 };
-                (v * gate, gate + inner)
-            }),
-        }
-    }
-
-    #[inline(always)]
-    fn finish_integer(
-        &self,
-        rescaling: &Rescaling,
-        activation: ActivationKind,
-        source: Option<&[f32]>,
-        out: &mut [f32],
-        slope: &mut [f32],
-    ) {
-        let scales = &rescaling.scales[..self.bias.len()];
-        if !rescaling.codes.is_empty() {
-            let codes = &rescaling.codes[..self.bias.len()];
-            self.each(out, slope, |v, o| {
-                let code = nearest(f64::from(v) * scales[o]).clamp(codes[o].0, codes[o].1);
-                (code as f32, scales[o] as f32)
-            });
-            return;
-        }
-        let zero = rescaling.zero_point;
-        let (low, high) = (f64::from(ACTIVATION_RANGE.0), f64::from(ACTIVATION_RANGE.1));
-        // The value saturated and without its zero point; and whether it was inside.
-        let saturate = |value: f64| {
-            let shifted = value + zero;
-            let inside = shifted >= low && shifted <= high;
-            ((shifted.clamp(low, high) - zero) as f32, inside)
-        };
-        if let Some(source) = source {
-            let columns = self.bias.len();
-            let rows = out.chunks_exact_mut(columns).zip(slope.chunks_exact_mut(columns));
-            for ((out, slope), source) in rows.zip(source.chunks_exact(columns)) {
-                for o in 0..columns {
-                    let main = nearest(f64::from(out[o] + self.bias[o]) * scales[o]);
-                    let (value, inside) = saturate(main + nearest(f64::from(source[o]) * rescaling.skip));
-                    out[o] = value;
-                    slope[o] = if inside { 1.0 } else { 0.0 };
-                }
-            }
-            return;
-        }
-        let plain = |v: f64, o: usize, leak: f64| {
-            let (value, inside) = saturate(nearest(v * scales[o]));
-            (value, if inside { (leak * scales[o]) as f32 } else { 0.0 })
-        };
-        if !self.shape.activated {
-            self.each(out, slope, |v, o| plain(f64::from(v), o, 1.0));
-            return;
-        }
-        match activation {
-            ActivationKind::Relu => self.each(out, slope, |v, o| {
-                let open = if v > 0.0 { 1.0 } else { 0.0 };
-                plain(f64::from(v) * open, o, open)
-            }),
-            ActivationKind::Leaky { shift } => {
-                let leak = 1.0 / f64::from(1_u8 << shift);
-                self.each(out, slope, |v, o| {
-                    let v = f64::from(v);
-                    if v >= 0.0 { plain(v, o, 1.0) } else { plain(nearest(v * leak), o, leak) }
-                });
-            }
-            ActivationKind::HardGelu => {
-                let one = f64::from(6 << GATE_FRACTION_BITS);
-                let range = (f64::from(GATE_RANGE.0), f64::from(GATE_RANGE.1));
-                self.each(out, slope, |v, o| {
-                    let argument = nearest(f64::from(v) * scales[o]).clamp(range.0, range.1);
-                    let open = 2.0 * argument + one / 2.0;
-                    let gates = open.clamp(0.0, one);
-                    let inner = if open > 0.0 && open < one { 2.0 * argument } else { 0.0 };
-                    let (value, inside) = saturate(nearest(argument * gates * rescaling.gate));
-                    let slope = (gates + inner) * rescaling.gate * scales[o];
-                    (value, if inside { slope as f32 } else { 0.0 })
-                });
-            }
-        }
-    }
-
-    /// `f` of every accumulator (bias added) and its column.
-    #[inline(always)]
-    fn each(&self, out: &mut [f32], slope: &mut [f32], f: impl Fn(f32, usize) -> (f32, f32)) {
-        let columns = self.bias.len();
-        for (out, slope) in out.chunks_exact_mut(columns).zip(slope.chunks_exact_mut(columns)) {
-            for o in 0..columns {
-                (out[o], slope[o]) = f(out[o] + self.bias[o], o);
             }
         }
     }
@@ -251,6 +158,189 @@ impl Prepared {
         match &self.epilogue {
             Epilogue::Real => 1.0,
             Epilogue::Integer(rescaling) => rescaling.codes[channel].1 as f32,
+        }
+    }
+}
+
+/// What happens to one accumulator (bias added) of column `o`: its output and its slope.
+trait Element {
+    fn of(&self, value: f32, o: usize) -> (f32, f32);
+}
+
+struct Each<'a, E> {
+    element: E,
+    bias: &'a [f32],
+    out: &'a mut [f32],
+    slope: &'a mut [f32],
+}
+
+fn each<E: Element>(element: E, bias: &[f32], out: &mut [f32], slope: &mut [f32]) {
+    vectorised(Each { element, bias, out, slope });
+}
+
+impl<E: Element> Vectorised for Each<'_, E> {
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        let columns = self.bias.len();
+        for (out, slope) in
+            self.out.chunks_exact_mut(columns).zip(self.slope.chunks_exact_mut(columns))
+        {
+            for o in 0..columns {
+                let (value, derivative) = self.element.of(out[o] + self.bias[o], o);
+                out[o] = value;
+                slope[o] = derivative;
+            }
+        }
+    }
+}
+
+struct RealIdentity;
+
+impl Element for RealIdentity {
+    #[inline(always)]
+    fn of(&self, value: f32, _: usize) -> (f32, f32) {
+        (value, 1.0)
+    }
+}
+
+/// Leaky ReLU with this slope; ReLU is the slope 0.
+struct RealLeaky(f32);
+
+impl Element for RealLeaky {
+    #[inline(always)]
+    fn of(&self, value: f32, _: usize) -> (f32, f32) {
+        let slope = if value >= 0.0 { 1.0 } else { self.0 };
+        (value * slope, slope)
+    }
+}
+
+struct RealGelu;
+
+impl Element for RealGelu {
+    #[inline(always)]
+    fn of(&self, value: f32, _: usize) -> (f32, f32) {
+        let gate = (value * (1.0 / 3.0) + 0.5).clamp(0.0, 1.0);
+        let inner = if gate > 0.0 && gate < 1.0 { value * (1.0 / 3.0) } else { 0.0 };
+        (value * gate, gate + inner)
+    }
+}
+
+struct RealSkip<'a> {
+    bias: &'a [f32],
+    source: &'a [f32],
+    out: &'a mut [f32],
+    slope: &'a mut [f32],
+}
+
+impl Vectorised for RealSkip<'_> {
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        let columns = self.bias.len();
+        let rows = self.out.chunks_exact_mut(columns).zip(self.source.chunks_exact(columns));
+        for (out, source) in rows {
+            for ((out, source), bias) in out.iter_mut().zip(source).zip(self.bias) {
+                *out += bias + source;
+            }
+        }
+        self.slope.fill(1.0);
+    }
+}
+
+/// The end of every hidden layer: zero point, saturation, and the zero point away again.
+#[derive(Clone, Copy)]
+struct Saturation {
+    zero: f64,
+}
+
+impl Saturation {
+    /// The value without its zero point, and 1 where nothing was cut, 0 elsewhere.
+    #[inline(always)]
+    fn of(self, value: f64) -> (f32, f32) {
+        let (low, high) = (f64::from(ACTIVATION_RANGE.0), f64::from(ACTIVATION_RANGE.1));
+        let shifted = value + self.zero;
+        let kept = shifted.max(low).min(high);
+        ((kept - self.zero) as f32, if kept == shifted { 1.0 } else { 0.0 })
+    }
+}
+
+/// Identity (leak 1), ReLU (leak 0) or leaky ReLU, rescaled.
+struct IntegerLeaky<'a> {
+    scales: &'a [f64],
+    saturation: Saturation,
+    leak: f64,
+}
+
+impl Element for IntegerLeaky<'_> {
+    #[inline(always)]
+    fn of(&self, value: f32, o: usize) -> (f32, f32) {
+        let value = f64::from(value);
+        // The rounding of a leak of 1 or 0 changes nothing.
+        let (value, leak) =
+            if value >= 0.0 { (value, 1.0) } else { (nearest(value * self.leak), self.leak) };
+        let (out, inside) = self.saturation.of(nearest(value * self.scales[o]));
+        (out, inside * (leak * self.scales[o]) as f32)
+    }
+}
+
+struct IntegerGelu<'a> {
+    scales: &'a [f64],
+    saturation: Saturation,
+    gate: f64,
+}
+
+impl Element for IntegerGelu<'_> {
+    #[inline(always)]
+    fn of(&self, value: f32, o: usize) -> (f32, f32) {
+        let one = f64::from(6 << GATE_FRACTION_BITS);
+        let (low, high) = (f64::from(GATE_RANGE.0), f64::from(GATE_RANGE.1));
+        let argument = nearest(f64::from(value) * self.scales[o]).max(low).min(high);
+        let open = 2.0 * argument + one / 2.0;
+        let gates = open.max(0.0).min(one);
+        let inner = if gates == open { 2.0 * argument } else { 0.0 };
+        let (out, inside) = self.saturation.of(nearest(argument * gates * self.gate));
+        (out, inside * ((gates + inner) * self.gate * self.scales[o]) as f32)
+    }
+}
+
+/// The last layer: codes.
+struct IntegerCodes<'a> {
+    scales: &'a [f64],
+    codes: &'a [(f64, f64)],
+}
+
+impl Element for IntegerCodes<'_> {
+    #[inline(always)]
+    fn of(&self, value: f32, o: usize) -> (f32, f32) {
+        let (low, high) = self.codes[o];
+        let code = nearest(f64::from(value) * self.scales[o]).max(low).min(high);
+        (code as f32, self.scales[o] as f32)
+    }
+}
+
+struct IntegerSkip<'a> {
+    bias: &'a [f32],
+    scales: &'a [f64],
+    skip: f64,
+    saturation: Saturation,
+    source: &'a [f32],
+    out: &'a mut [f32],
+    slope: &'a mut [f32],
+}
+
+impl Vectorised for IntegerSkip<'_> {
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        let columns = self.bias.len();
+        let scales = &self.scales[..columns];
+        let rows = self.out.chunks_exact_mut(columns).zip(self.slope.chunks_exact_mut(columns));
+        for ((out, slope), source) in rows.zip(self.source.chunks_exact(columns)) {
+            for o in 0..columns {
+                let main = nearest(f64::from(out[o] + self.bias[o]) * scales[o]);
+                let (value, inside) =
+                    self.saturation.of(main + nearest(f64::from(source[o]) * self.skip));
+                out[o] = value;
+                slope[o] = inside;
+            }
         }
     }
 }

@@ -113,6 +113,14 @@ impl Texels {
         &self.mips[usize::from(mip)][at..at + self.channels]
     }
 
+    /// The mean of a channel over the coarsest mip.
+    pub(crate) fn mean(&self, channel: usize) -> f32 {
+        let Some(coarsest) = self.mips.last() else { return 0.0 };
+        let texels = coarsest.chunks_exact(self.channels);
+        let count = texels.len() as f32;
+        texels.map(|t| t[channel]).sum::<f32>() / count
+    }
+
     /// Every texel of every mip.
     pub(crate) fn count(&self) -> u64 {
         self.sizes.iter().map(|&(w, h)| u64::from(w) * u64::from(h)).sum()

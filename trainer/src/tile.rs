@@ -1,7 +1,7 @@
 //! Tile: the way of [`TILE`] texels through a network, and the way of their gradients back.
 
 use crate::config::TILE;
-use crate::kernel::{product, product_transposed};
+use crate::kernel::{Vectorised, product, product_transposed, vectorised};
 use crate::network::Network;
 use crate::topology::Topology;
 
@@ -31,7 +31,6 @@ impl Workspace {
     }
 
     /// The outputs of the last layer, texels × padded channels: reals, or codes.
-    #[inline(always)]
     pub(crate) fn output(&self) -> &[f32] {
         self.outs.last().map_or(&[], Vec::as_slice)
     }
@@ -42,20 +41,14 @@ impl Workspace {
     }
 
     /// From the inputs to the outputs.
-    #[inline(always)]
-    pub(crate) fn forward<const FUSED: bool>(&mut self, network: &Network) {
+    pub(crate) fn forward(&mut self, network: &Network) {
         for (index, layer) in network.layers.iter().enumerate() {
             let (before, rest) = self.outs.split_at_mut(index);
             let out = &mut rest[0];
             let input = before.last().unwrap_or(&self.inputs);
             let shape = layer.shape;
-            product::<FUSED, false>(
-                (input, shape.rows()),
-                &layer.weights,
-                out,
-                shape.inputs,
-                shape.columns(),
-            );
+            let (depth, columns) = (shape.inputs, shape.columns());
+            product((input, shape.rows()), &layer.weights, out, depth, columns, false);
             let source = shape.skip.map(|span| before[index - span].as_slice());
             layer.finish(network.activation, source, out, &mut self.slopes[index]);
         }
@@ -67,7 +60,6 @@ impl Workspace {
     /// An output is compared after it is limited to what its format can emit, and the gradient
     /// passes the limit unchanged: an output beyond a limit that the target sits on costs nothing
     /// and is left alone, one whose target lies inside is pulled back.
-    #[inline(always)]
     pub(crate) fn compare(&mut self, network: &Network, targets: &[f32], scale: f32) -> f64 {
         let last = network.layers.len() - 1;
         let layer = &network.layers[last];
@@ -90,8 +82,7 @@ impl Workspace {
 
     /// From the outputs' gradient to those of the parameters, which are added to `parameters`,
     /// and those of the inputs, which replace `inputs`.
-    #[inline(always)]
-    pub(crate) fn backward<const FUSED: bool>(
+    pub(crate) fn backward(
         &mut self,
         network: &Network,
         parameters: &mut [f32],
@@ -103,36 +94,20 @@ impl Workspace {
             let shape = layer.shape;
             let (before, rest) = self.gradients.split_at_mut(index);
             let gradient = &mut rest[0];
+            let slope = self.slopes[index].as_slice();
             if let Some(span) = shape.skip {
-                let (source_gain, row_gains) = layer.skip_gains();
+                let (source_gain, gains) = layer.skip_gains();
                 let source = &mut before[index - span];
-                for ((g, s), slope) in
-                    gradient.iter_mut().zip(source.iter_mut()).zip(&self.slopes[index])
-                {
-                    *g *= slope;
-                    *s = *g * source_gain;
-                }
-                if let Some(gains) = row_gains {
-                    for row in gradient.chunks_exact_mut(shape.columns()) {
-                        for (g, &gain) in row.iter_mut().zip(gains) {
-                            *g *= gain as f32;
-                        }
-                    }
-                }
+                let columns = shape.columns();
+                vectorised(SkipBack { columns, source_gain, gains, slope, gradient, source });
             } else if index != last {
-                for (g, slope) in gradient.iter_mut().zip(&self.slopes[index]) {
-                    *g *= slope;
-                }
+                vectorised(Scale { gradient, slope });
             }
             let input = if index == 0 { &self.inputs } else { &self.outs[index - 1] };
             let weights = &mut parameters[shape.weights_at..shape.bias_at];
-            product_transposed::<FUSED>((input, shape.rows()), (gradient, shape.columns()), weights);
+            product_transposed((input, shape.rows()), (gradient, shape.columns()), weights);
             let bias = &mut parameters[shape.bias_at..shape.bias_at + shape.columns()];
-            for row in gradient.chunks_exact(shape.columns()) {
-                for (b, g) in bias.iter_mut().zip(row) {
-                    *b += g;
-                }
-            }
+            vectorised(ColumnSums { gradient, sums: bias });
             // A skip path that starts here left its share already.
             let is_source = index > 0
                 && network.layers.iter().enumerate().any(|(later, l)| {
@@ -141,10 +116,63 @@ impl Workspace {
             let out = if index == 0 { &mut *inputs } else { &mut before[index - 1] };
             let (depth, columns) = (shape.outputs, shape.rows());
             let gradient = (gradient.as_slice(), shape.columns());
-            if is_source {
-                product::<FUSED, true>(gradient, &layer.transposed, out, depth, columns);
-            } else {
-                product::<FUSED, false>(gradient, &layer.transposed, out, depth, columns);
+            product(gradient, &layer.transposed, out, depth, columns, is_source);
+        }
+    }
+}
+
+struct Scale<'a> {
+    gradient: &'a mut [f32],
+    slope: &'a [f32],
+}
+
+impl Vectorised for Scale<'_> {
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        for (g, slope) in self.gradient.iter_mut().zip(self.slope) {
+            *g *= slope;
+        }
+    }
+}
+
+/// The gradient of a sum of a layer and its skip path, to both.
+struct SkipBack<'a> {
+    columns: usize,
+    source_gain: f32,
+    gains: Option<&'a [f64]>,
+    slope: &'a [f32],
+    gradient: &'a mut [f32],
+    source: &'a mut [f32],
+}
+
+impl Vectorised for SkipBack<'_> {
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        for ((g, s), slope) in self.gradient.iter_mut().zip(self.source).zip(self.slope) {
+            *g *= slope;
+            *s = *g * self.source_gain;
+        }
+        if let Some(gains) = self.gains {
+            for row in self.gradient.chunks_exact_mut(self.columns) {
+                for (g, &gain) in row.iter_mut().zip(gains) {
+                    *g *= gain as f32;
+                }
+            }
+        }
+    }
+}
+
+struct ColumnSums<'a> {
+    gradient: &'a [f32],
+    sums: &'a mut [f32],
+}
+
+impl Vectorised for ColumnSums<'_> {
+    #[inline(always)]
+    fn run<const FUSED: bool>(self) {
+        for row in self.gradient.chunks_exact(self.sums.len()) {
+            for (sum, g) in self.sums.iter_mut().zip(row) {
+                *sum += g;
             }
         }
     }

@@ -64,7 +64,11 @@ pub fn requantize(requantizer: Requantizer, magnitude: f64, multiplier: Multipli
 #[must_use]
 pub fn double_offset(multiplier: Multiplier) -> f64 {
     let shift = i32::from(multiplier.shift());
-    if shift > 31 { 2_f64.powi(30 - shift) } else { 0.0 }
+    if shift > 31 {
+        2_f64.powi(30 - shift)
+    } else {
+        0.0
+    }
 }
 
 /// The scale that `Narrow` uses, less the scale that was meant.
@@ -90,7 +94,10 @@ fn gate_error(argument: f64, error: f64) -> f64 {
     let high = (argument + error).clamp(-32_768.0, 32_767.0);
     let lowest = (-192.0_f64).clamp(low, high);
     let from = gate(argument.clamp(-32_768.0, 32_767.0));
-    [low, lowest, high].iter().map(|&at| (gate(at) - from).abs()).fold(0.0, f64::max)
+    [low, lowest, high]
+        .iter()
+        .map(|&at| (gate(at) - from).abs())
+        .fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -113,7 +120,10 @@ mod tests {
     fn the_second_rounding_of_double_costs_a_quarter_at_most() {
         let at = |shift| Multiplier::new(1 << 30, shift).unwrap();
         let bound = |shift| requantize(Requantizer::Double, 1.0, at(shift));
-        assert_eq!([31, 32, 33, 62].map(bound), [0.5, 0.75, 0.625, 0.5 + 2_f64.powi(-32)]);
+        assert_eq!(
+            [31, 32, 33, 62].map(bound),
+            [0.5, 0.75, 0.625, 0.5 + 2_f64.powi(-32)]
+        );
     }
 
     #[test]
@@ -121,7 +131,9 @@ mod tests {
         for argument in (-500..500).map(f64::from) {
             for error in [0.5, 3.25, 40.0, 200.0] {
                 let walk = (-256..=256).map(|step| argument + error * f64::from(step) / 256.0);
-                let moved = walk.map(|at| (gate(at) - gate(argument)).abs()).fold(0.0, f64::max);
+                let moved = walk
+                    .map(|at| (gate(at) - gate(argument)).abs())
+                    .fold(0.0, f64::max);
                 let bound = gate_error(argument, error);
                 // A walk of 513 points misses the lowest point by 200/256 at most, and the product
                 // is curved by 4 there.

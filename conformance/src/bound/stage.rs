@@ -24,13 +24,20 @@ pub fn inputs(asset: &Asset) -> Vec<f64> {
     let shape = &asset.shape;
     let dropped = |grid: usize, more: u32| {
         let bits = u32::from(shape.grids[grid].format.bits());
-        rounding(asset.profile.input, (bits + more).saturating_sub(INPUT_BITS))
+        rounding(
+            asset.profile.input,
+            (bits + more).saturating_sub(INPUT_BITS),
+        )
     };
     let mut bounds = vec![dropped(0, 0); 4 * usize::from(shape.grids[0].channels)];
     let interpolated = dropped(1, WEIGHT_BITS);
     bounds.extend(vec![interpolated; usize::from(shape.grids[1].channels)]);
     bounds.extend(vec![0.0; usize::from(shape.wave_count())]);
-    bounds.push(if shape.mip_count > 1 { 0.5 + float_error(127.0) } else { 0.0 });
+    bounds.push(if shape.mip_count > 1 {
+        0.5 + float_error(127.0)
+    } else {
+        0.0
+    });
     bounds
 }
 
@@ -78,7 +85,12 @@ pub fn outputs(asset: &Asset, layer: usize, activated: &[f64], source: Option<&[
 /// The channel codes, given the last layer's activated accumulators: one rescaling.
 #[must_use]
 pub fn channels(asset: &Asset, activated: &[f64]) -> Vec<f64> {
-    rescaled(asset, asset.layers.len() - 1, asset.profile.output, activated)
+    rescaled(
+        asset,
+        asset.layers.len() - 1,
+        asset.profile.output,
+        activated,
+    )
 }
 
 fn rescaled(
@@ -89,7 +101,8 @@ fn rescaled(
 ) -> Vec<f64> {
     let parameters = &asset.layers[layer];
     let rows = activated.iter().enumerate();
-    rows.map(|(row, &a)| one(requantizer, a, output_multiplier(parameters, row))).collect()
+    rows.map(|(row, &a)| one(requantizer, a, output_multiplier(parameters, row)))
+        .collect()
 }
 
 /// One rescaling of one value; zero is rescaled to zero by every requantiser.

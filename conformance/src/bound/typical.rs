@@ -8,8 +8,8 @@
 //!
 //! The derivatives are taken at the oracle's own values, backwards from the channel: they know which
 //! ReLUs are shut and which lanes are saturated, and carry the correlation between lanes that
-//! share a source, skip paths included. What is an integer in the oracle is not rounded and adds
-//! nothing. Not modelled: the tie rules' own mean (2^−k of an LSB for k dropped bits), and a ReLU
+//! share a source, skip paths included. An input that is an integer in the oracle is not rounded, nor
+//! is the rescaling of a zero. Not modelled: the tie rules' own mean (2^−k of an LSB for k dropped bits), and a ReLU
 //! or a clamp that a rounding pushes over its corner.
 
 use super::{double_offset, narrow_error};
@@ -34,13 +34,18 @@ pub fn rms(oracle: &Oracle<'_>, requests: &[Request]) -> Vec<f64> {
             *square += expected;
         }
     }
-    squares.iter().map(|s| (s / requests.len().max(1) as f64).sqrt()).collect()
+    squares
+        .iter()
+        .map(|s| (s / requests.len().max(1) as f64).sqrt())
+        .collect()
 }
 
 /// The expected square of `model − oracle` per channel of one texel, in LSB² of the channel.
 #[must_use]
 pub fn texel(oracle: &Oracle<'_>, taps: &RealTaps) -> Vec<f64> {
-    (0..taps.unclamped.len()).map(|channel| channel_square(oracle, taps, channel)).collect()
+    (0..taps.unclamped.len())
+        .map(|channel| channel_square(oracle, taps, channel))
+        .collect()
 }
 
 /// Mean and variance of what the roundings add up to.
@@ -81,8 +86,11 @@ fn channel_square(oracle: &Oracle<'_>, taps: &RealTaps, channel: usize) -> f64 {
     }
     let mut sum = Sum::default();
     // Derivatives with respect to the outputs of every layer, filled from the back.
-    let mut to_outputs: Vec<Vec<f64>> =
-        asset.layers.iter().map(|layer| vec![0.0; usize::from(layer.outputs)]).collect();
+    let mut to_outputs: Vec<Vec<f64>> = asset
+        .layers
+        .iter()
+        .map(|layer| vec![0.0; usize::from(layer.outputs)])
+        .collect();
     to_outputs[last][channel] = 1.0;
     let mut to_inputs = Vec::new();
     for index in (0..=last).rev() {
@@ -90,7 +98,10 @@ fn channel_square(oracle: &Oracle<'_>, taps: &RealTaps, channel: usize) -> f64 {
         let real = &taps.layers[index];
         let source = oracle.skip_source(index);
         let values = source.map(|from| {
-            (taps.layers[from].outputs.as_slice(), f64::from(asset.layers[from].zero_point))
+            (
+                taps.layers[from].outputs.as_slice(),
+                f64::from(asset.layers[from].zero_point),
+            )
         });
         let unclamped = outputs_unclamped(layer, &real.activated, values);
         let mut to_input = vec![0.0; usize::from(layer.inputs)];
@@ -101,7 +112,11 @@ fn channel_square(oracle: &Oracle<'_>, taps: &RealTaps, channel: usize) -> f64 {
                 continue;
             }
             let profile = &asset.profile;
-            let requantizer = if index == last { profile.output } else { profile.requantize };
+            let requantizer = if index == last {
+                profile.output
+            } else {
+                profile.requantize
+            };
             let multiplier = output_multiplier(layer, row);
             sum.rescale(g, requantizer, real.activated[row], multiplier);
             if let (Some(skip), Some((source, zero_point)), Some(from)) =
@@ -144,7 +159,13 @@ fn activation(
     let parameters = &asset.layers[layer];
     match parameters.activation {
         Activation::Identity => g,
-        Activation::Relu => if a > 0.0 { g } else { 0.0 },
+        Activation::Relu => {
+            if a > 0.0 {
+                g
+            } else {
+                0.0
+            }
+        }
         Activation::Leaky { shift } if a < 0.0 => {
             let slope = 2_f64.powi(-i32::from(shift));
             sum.add(g, rounding_mean(asset.profile.leak, u32::from(shift)));

@@ -26,7 +26,11 @@ pub fn texel(oracle: &Oracle<'_>, taps: &RealTaps) -> Vec<f64> {
             .map(|row| activation(asset, index, row, real.accumulators[row], accumulated[row]))
             .collect();
         let is_last = index + 1 == taps.layers.len();
-        let requantizer = if is_last { profile.output } else { profile.requantize };
+        let requantizer = if is_last {
+            profile.output
+        } else {
+            profile.requantize
+        };
         let mut rescaled: Vec<f64> = (0..activated.len())
             .map(|row| {
                 let multiplier = output_multiplier(layer, row);
@@ -36,7 +40,10 @@ pub fn texel(oracle: &Oracle<'_>, taps: &RealTaps) -> Vec<f64> {
         if is_last {
             let formats = asset.shape.outputs.iter().map(|format| format.range());
             let reals = taps.unclamped.iter().zip(&rescaled);
-            return reals.zip(formats).map(|((&r, &e), range)| clamped(r, e, range)).collect();
+            return reals
+                .zip(formats)
+                .map(|((&r, &e), range)| clamped(r, e, range))
+                .collect();
         }
         let source = oracle.skip_source(index);
         if let (Some(skip), Some(from)) = (layer.skip, source) {
@@ -48,7 +55,10 @@ pub fn texel(oracle: &Oracle<'_>, taps: &RealTaps) -> Vec<f64> {
             }
         }
         let source = source.map(|from| {
-            (taps.layers[from].outputs.as_slice(), f64::from(asset.layers[from].zero_point))
+            (
+                taps.layers[from].outputs.as_slice(),
+                f64::from(asset.layers[from].zero_point),
+            )
         });
         let unclamped = outputs_unclamped(layer, &real.activated, source);
         let pairs = unclamped.iter().zip(&rescaled);
@@ -68,11 +78,19 @@ pub fn asset(asset: &Asset) -> Vec<f64> {
     for (index, layer) in asset.layers.iter().enumerate() {
         let is_last = index + 1 == asset.layers.len();
         let accumulated = dense(asset, index, &radii[index]);
-        let requantizer = if is_last { profile.output } else { profile.requantize };
+        let requantizer = if is_last {
+            profile.output
+        } else {
+            profile.requantize
+        };
         let mut rescaled: Vec<f64> = (0..accumulated.len())
             .map(|row| {
                 // An input is at most 128 in magnitude.
-                let products: f64 = layer.row(row).iter().map(|&w| f64::from(w).abs() * 128.0).sum();
+                let products: f64 = layer
+                    .row(row)
+                    .iter()
+                    .map(|&w| f64::from(w).abs() * 128.0)
+                    .sum();
                 let largest = f64::from(layer.bias[row]).abs() + products;
                 let radius = accumulated[row];
                 let (largest, radius) = match layer.activation {
@@ -91,7 +109,11 @@ pub fn asset(asset: &Asset) -> Vec<f64> {
         if is_last {
             let widths = asset.shape.outputs.iter().map(|format| format.range());
             let widths = widths.map(|(low, high)| f64::from(high - low));
-            return rescaled.iter().zip(widths).map(|(&radius, width)| radius.min(width)).collect();
+            return rescaled
+                .iter()
+                .zip(widths)
+                .map(|(&radius, width)| radius.min(width))
+                .collect();
         }
         if let Some(skip) = layer.skip {
             let from = index - usize::from(skip.span);
@@ -111,10 +133,17 @@ fn dense(asset: &Asset, layer: usize, radii: &[f64]) -> Vec<f64> {
     (0..usize::from(parameters.outputs))
         .map(|row| {
             let terms = parameters.row(row).iter().zip(radii);
-            let magnitude: f64 = parameters.row(row).iter().map(|&w| f64::from(w).abs()).sum();
+            let magnitude: f64 = parameters
+                .row(row)
+                .iter()
+                .map(|&w| f64::from(w).abs())
+                .sum();
             // The oracle's own sums of reals: one rounding per term, of a sum below 2^31.
             let float = float_error(magnitude * 128.0) * f64::from(parameters.inputs);
-            terms.map(|(&w, radius)| f64::from(w).abs() * radius).sum::<f64>() + float
+            terms
+                .map(|(&w, radius)| f64::from(w).abs() * radius)
+                .sum::<f64>()
+                + float
         })
         .collect()
 }
@@ -129,7 +158,13 @@ fn activation(asset: &Asset, layer: usize, row: usize, a: f64, radius: f64) -> f
             ends[0].max(ends[1])
         }
         Activation::Leaky { shift } => {
-            let leak = |x: f64| if x < 0.0 { x / 2_f64.powi(i32::from(shift)) } else { x };
+            let leak = |x: f64| {
+                if x < 0.0 {
+                    x / 2_f64.powi(i32::from(shift))
+                } else {
+                    x
+                }
+            };
             let ends = [a - radius, a + radius].map(|end| (leak(end) - leak(a)).abs());
             let rounded = rounding(asset.profile.leak, u32::from(shift));
             ends[0].max(ends[1]) + if a - radius < 0.0 { rounded } else { 0.0 }
@@ -145,8 +180,9 @@ fn activation(asset: &Asset, layer: usize, row: usize, a: f64, radius: f64) -> f
 /// The radius after a rescaling of a value with a radius.
 fn through(requantizer: Requantizer, value: f64, radius: f64, multiplier: Multiplier) -> f64 {
     let largest = value.abs() + radius;
-    if largest == 0.0 {
-        return 0.0;
+    if largest < 1.0 {
+        // The model's value is an integer, therefore 0, which every requantiser rescales to 0.
+        return largest * scale(multiplier);
     }
     let result = (largest * scale(multiplier)).min(2_f64.powi(31));
     radius * scale(multiplier) + requantize(requantizer, largest, multiplier) + float_error(result)

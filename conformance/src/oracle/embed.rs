@@ -34,7 +34,10 @@ pub fn inputs(shape: &Shape, grids: &[Vec<u8>; 2], request: Request) -> Vec<f64>
         }
     }
     lanes.push(level(request.mip(), shape.mip_count));
-    lanes.iter().map(|real| (real * UNITS).clamp(-128.0, 127.0)).collect()
+    lanes
+        .iter()
+        .map(|real| (real * UNITS).clamp(-128.0, 127.0))
+        .collect()
 }
 
 /// The weight and the real latents of the corners (0,0), (1,0), (0,1), (1,1) of a grid.

@@ -47,7 +47,11 @@ impl<'a> Oracle<'a> {
     /// The decoder of `asset`.
     #[must_use]
     pub fn new(asset: &'a Asset) -> Oracle<'a> {
-        let layers = asset.layers.iter().map(synthesizer::Synthesizer::new).collect();
+        let layers = asset
+            .layers
+            .iter()
+            .map(synthesizer::Synthesizer::new)
+            .collect();
         Oracle { asset, layers }
     }
 
@@ -95,14 +99,27 @@ impl<'a> Oracle<'a> {
             let outputs = if index + 1 == self.layers.len() {
                 Vec::new()
             } else {
-                let source = self.skip_source(index).map(|from| layers[from].outputs.as_slice());
+                let source = self
+                    .skip_source(index)
+                    .map(|from| layers[from].outputs.as_slice());
                 self.outputs(index, &activated, source)
             };
-            layers.push(RealLayer { accumulators, activated, outputs });
+            layers.push(RealLayer {
+                accumulators,
+                activated,
+                outputs,
+            });
         }
-        let unclamped = layers.last().map_or(Vec::new(), |last| self.channels(&last.activated));
+        let unclamped = layers
+            .last()
+            .map_or(Vec::new(), |last| self.channels(&last.activated));
         let channels = self.clamp_channels(&unclamped);
-        RealTaps { inputs, layers, unclamped, channels }
+        RealTaps {
+            inputs,
+            layers,
+            unclamped,
+            channels,
+        }
     }
 
     /// Every texel of a mip: `[row][column][channel]` in one vector, clamped, in code units.
@@ -142,9 +159,10 @@ impl<'a> Oracle<'a> {
     /// start of its skip path, if it has one.
     #[must_use]
     pub fn outputs(&self, layer: usize, activated: &[f64], source: Option<&[f64]>) -> Vec<f64> {
-        let source = self.skip_source(layer).zip(source).map(|(from, values)| {
-            (values, f64::from(self.asset.layers[from].zero_point))
-        });
+        let source = self
+            .skip_source(layer)
+            .zip(source)
+            .map(|(from, values)| (values, f64::from(self.asset.layers[from].zero_point)));
         synthesizer::outputs(&self.asset.layers[layer], activated, source)
     }
 

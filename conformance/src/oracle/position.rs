@@ -31,7 +31,11 @@ impl RealAxis {
             CornerSnap::Stride => (g.floor() / stride).floor() * stride,
         };
         let fraction = (16.0 * (g - first) / stride).floor() / 16.0;
-        RealAxis { first, stride, fraction }
+        RealAxis {
+            first,
+            stride,
+            fraction,
+        }
     }
 
     /// The two corners as cells of a grid of `size` cells.

@@ -102,7 +102,8 @@ pub fn output_multiplier(layer: &Layer, row: usize) -> Multiplier {
 #[must_use]
 pub fn rescaled(layer: &Layer, activated: &[f64]) -> Vec<f64> {
     let rows = activated.iter().enumerate();
-    rows.map(|(row, &a)| rescale(a, output_multiplier(layer, row))).collect()
+    rows.map(|(row, &a)| rescale(a, output_multiplier(layer, row)))
+        .collect()
 }
 
 /// A hidden layer's output: rescaled, plus the skip path (values and their zero point), plus the
@@ -110,7 +111,10 @@ pub fn rescaled(layer: &Layer, activated: &[f64]) -> Vec<f64> {
 #[must_use]
 pub fn outputs(layer: &Layer, activated: &[f64], source: Option<(&[f64], f64)>) -> Vec<f64> {
     let unclamped = outputs_unclamped(layer, activated, source);
-    unclamped.iter().map(|value| value.clamp(-128.0, 127.0)).collect()
+    unclamped
+        .iter()
+        .map(|value| value.clamp(-128.0, 127.0))
+        .collect()
 }
 
 /// As [`outputs`], before the clamp.

@@ -1,0 +1,423 @@
+//! The texel suite: small assets, decoded with every intermediate value.
+
+use super::SuiteError;
+use crate::emit::Builder;
+use crate::flag::{self, Flag};
+use crate::stage;
+use crate::synthetic::{self, Random, Spec, SpecActivation, grid};
+use crate::vector::{Answer, TexelQuery, VectorFile};
+use ntmu_isa::layout::Layout;
+use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::profile::Profile;
+use ntmu_isa::rescale::Requantizer;
+use ntmu_isa::round::Rounding;
+use ntmu_isa::shape::{OutputFormat, Shape};
+use ntmu_isa::{Asset, Program};
+use ntmu_model::Request;
+use ntmu_model::exec::Decoder;
+
+/// One asset of the suite.
+struct Subject {
+    name: &'static str,
+    comment: &'static str,
+    flags: &'static [Flag],
+    spec: Spec,
+}
+
+/// The suite.
+///
+/// # Errors
+/// Never: all specs are within the limits of an asset.
+pub fn suite() -> Result<VectorFile, SuiteError> {
+    let about = "channel codes of texels of small assets, with the values of every stage";
+    let mut builder = Builder::new("texel", about);
+    for (seed, subject) in (1..).zip(subjects()) {
+        let asset = synthetic::asset(&subject.spec, seed).map_err(|error| SuiteError::Asset {
+            name: subject.name.to_owned(),
+            error,
+        })?;
+        builder.asset(subject.name, subject.comment, &asset);
+        decode(&mut builder, &subject, &asset);
+    }
+    Ok(builder.build())
+}
+
+/// A request of the suite and what is special about it.
+struct Place {
+    request: Request,
+    flag: Option<Flag>,
+    comment: String,
+}
+
+fn decode(builder: &mut Builder, subject: &Subject, asset: &Asset) {
+    let program = Program::compile(asset, Layout::Linear);
+    let decoder = Decoder::new(asset, &program);
+    let mut places = places(&asset.shape);
+    separate(asset, &decoder, &mut places);
+    for place in places {
+        let request = place.request;
+        let taps = decoder.taps(request);
+        let is_seam = taps.grids.iter().zip([0, 1]).any(|(tap, grid)| {
+            let (width, height) = asset.shape.grid_size(grid);
+            [(tap.corners.x, width), (tap.corners.y, height)]
+                .iter()
+                .any(|(axis, cells)| {
+                    axis.first < 0 || axis.first + axis.stride as i32 >= *cells as i32
+                })
+        });
+        let is_deep = asset
+            .shape
+            .grids
+            .iter()
+            .any(|grid| request.mip() > grid.scale_log2);
+        let mut flags = subject.flags.to_vec();
+        flags.extend(place.flag);
+        flags.extend(is_seam.then_some(flag::SEAM));
+        flags.extend(is_deep.then_some(flag::DEEP_MIP));
+        if flags.is_empty() {
+            flags.push(flag::PLAIN);
+        }
+        let (x, y, mip) = (request.x(), request.y(), request.mip());
+        let query = TexelQuery {
+            asset: subject.name.to_owned(),
+            x,
+            y,
+            mip,
+        };
+        let comment = format!("{}: ({x}, {y}) of mip {mip}{}", subject.name, place.comment);
+        let answer = Answer::Channels(taps.codes.clone());
+        builder.tapped(&comment, &flags, query, answer, stage::from_model(&taps));
+    }
+}
+
+/// Corners of every mip, and a texel inside.
+fn places(shape: &Shape) -> Vec<Place> {
+    let mut random = Random::new(7);
+    let mut places = Vec::new();
+    for mip in 0..shape.mip_count {
+        let (width, height) = shape.mip_size(mip);
+        let (right, bottom) = (width - 1, height - 1);
+        let mut texels = vec![(0, 0), (right, 0), (right, bottom)];
+        texels.dedup();
+        let mut texels: Vec<_> = texels
+            .into_iter()
+            .map(|at| (at, Some(flag::IMAGE_CORNER)))
+            .collect();
+        if width * height > 4 {
+            let x = random.within(0, right as i32) as u32;
+            texels.push(((x, random.within(0, bottom as i32) as u32), None));
+        }
+        places.extend(texels.into_iter().filter_map(|((x, y), flag)| {
+            let request = Request::new(shape, x, y, mip).ok()?;
+            Some(Place {
+                request,
+                flag,
+                comment: String::new(),
+            })
+        }));
+    }
+    places
+}
+
+/// Adds, for every rule of the profile and every other choice for it, the first texel whose codes
+/// the choice changes, unless a texel before does it already: to be wrong in one rule is to fail.
+fn separate(asset: &Asset, decoder: &Decoder<'_>, places: &mut Vec<Place>) {
+    for (rule, profile) in neighbours(asset.profile) {
+        let mut parts = asset.clone().into_parts();
+        parts.profile = profile;
+        // A profile is no part of what is validated.
+        let Ok(other) = Asset::new(parts) else {
+            continue;
+        };
+        let program = Program::compile(&other, Layout::Linear);
+        let other = Decoder::new(&other, &program);
+        let differs = |request| decoder.texel(request, &mut ()) != other.texel(request, &mut ());
+        if places.iter().any(|place| differs(place.request)) {
+            continue;
+        }
+        let all = (0..asset.shape.mip_count).flat_map(|mip| Request::blocks(&asset.shape, mip));
+        if let Some(request) = all.into_iter().find(|&request| differs(request)) {
+            let comment = format!(", which {rule} would change");
+            places.push(Place {
+                request,
+                flag: Some(flag::SEPARATING),
+                comment,
+            });
+        }
+    }
+}
+
+/// Every profile that differs from this one in one rule, and that difference in words.
+fn neighbours(profile: Profile) -> Vec<(String, Profile)> {
+    let mut neighbours = Vec::new();
+    for mode in Rounding::ALL {
+        let name = mode.name();
+        neighbours.push((
+            format!("input {name}"),
+            Profile {
+                input: mode,
+                ..profile
+            },
+        ));
+        neighbours.push((
+            format!("leak {name}"),
+            Profile {
+                leak: mode,
+                ..profile
+            },
+        ));
+    }
+    for requantizer in Requantizer::ALL {
+        let name = requantizer.name();
+        let with = Profile {
+            requantize: requantizer,
+            ..profile
+        };
+        neighbours.push((format!("requantize {name}"), with));
+        neighbours.push((
+            format!("skip {name}"),
+            Profile {
+                skip: requantizer,
+                ..profile
+            },
+        ));
+        neighbours.push((
+            format!("output {name}"),
+            Profile {
+                output: requantizer,
+                ..profile
+            },
+        ));
+    }
+    neighbours.retain(|(_, neighbour)| *neighbour != profile);
+    neighbours
+}
+
+fn subjects() -> Vec<Subject> {
+    let normative = Profile::NORMATIVE;
+    let ties = |name, requantizer: Requantizer, activation, comment, flags| {
+        let mut spec = Spec::small(16, 16);
+        let one = requantizer;
+        spec.profile = Profile {
+            requantize: one,
+            skip: one,
+            output: one,
+            ..normative
+        };
+        // Sixteen bits show a hidden LSB that eight would round away.
+        spec.shape.outputs = vec![OutputFormat::Unorm16, OutputFormat::Unorm8];
+        // Small weights drop few bits, so that ties are frequent.
+        (spec.has_ties, spec.weight_bits) = (true, 3);
+        spec.activation = activation;
+        Subject {
+            name,
+            comment,
+            flags,
+            spec,
+        }
+    };
+    let relu = SpecActivation::Relu;
+    let leaky = SpecActivation::Leaky(3);
+    let alternate: &[Flag] = &[
+        flag::ALTERNATE_PROFILE,
+        flag::SKIP_PATH,
+        flag::TIES_EVERYWHERE,
+    ];
+    let mut subjects = vec![Subject {
+        name: "plain",
+        comment: "one hidden layer, normative profile",
+        flags: &[],
+        spec: Spec {
+            blocks: 0,
+            ..Spec::small(16, 16)
+        },
+    }];
+    let deep = Spec {
+        shape: Shape {
+            snap: CornerSnap::Stride,
+            grids: [grid(1, 4, 3), grid(2, 3, 3)],
+            octaves: 0,
+            ..Spec::small(128, 64).shape
+        },
+        blocks: 0,
+        ..Spec::small(128, 64)
+    };
+    let mut deep_cell = deep.clone();
+    deep_cell.shape.snap = CornerSnap::Cell;
+    deep_cell.shape.address_mode = AddressMode::Clamp;
+    let (name, comment) = ("deep", "eight mips, corners snapped to the stride, wrap");
+    subjects.push(Subject {
+        name,
+        comment,
+        flags: &[],
+        spec: deep,
+    });
+    let (name, comment) = ("deep-cell", "eight mips, corners at the cell, clamp");
+    subjects.push(Subject {
+        name,
+        comment,
+        flags: &[],
+        spec: deep_cell,
+    });
+
+    let odd = Spec {
+        shape: Shape {
+            address_mode: AddressMode::Mirror,
+            grids: [grid(2, 1, 2), grid(1, 7, 1)],
+            octaves: 3,
+            outputs: OutputFormat::ALL.to_vec(),
+            ..Spec::small(37, 21).shape
+        },
+        weight_bits: 2,
+        activation: leaky,
+        ..Spec::small(37, 21)
+    };
+    let comment = "no size is a power of two, mirror, weights of two bits, all output formats";
+    let flags = &[flag::SKIP_PATH, flag::LEAK, flag::NON_POWER_OF_TWO];
+    subjects.push(Subject {
+        name: "odd",
+        comment,
+        flags,
+        spec: odd,
+    });
+
+    let eight = Spec {
+        shape: Shape {
+            grids: [grid(3, 8, 3), grid(3, 8, 2)],
+            ..Spec::small(24, 24).shape
+        },
+        profile: Profile {
+            input: Rounding::HalfEven,
+            leak: Rounding::HalfAway,
+            ..normative
+        },
+        activation: leaky,
+        block_span: 3,
+        ..Spec::small(24, 24)
+    };
+    let comment = "latents of eight bits, input rounding half-even, leak half-away, span of three";
+    let flags = &[
+        flag::EIGHT_BIT_LATENT,
+        flag::ALTERNATE_PROFILE,
+        flag::LEAK,
+        flag::SKIP_PATH,
+    ];
+    subjects.push(Subject {
+        name: "eight-bits",
+        comment,
+        flags,
+        spec: eight,
+    });
+
+    let floor = Spec {
+        profile: Profile {
+            input: Rounding::Floor,
+            leak: Rounding::Floor,
+            ..normative
+        },
+        activation: SpecActivation::Leaky(1),
+        blocks: 2,
+        block_span: 1,
+        ..Spec::small(9, 17)
+    };
+    let comment = "floors for input and leak, two blocks of one layer";
+    let flags = &[flag::ALTERNATE_PROFILE, flag::LEAK, flag::SKIP_PATH];
+    subjects.push(Subject {
+        name: "floor",
+        comment,
+        flags,
+        spec: floor,
+    });
+
+    let gate = Spec {
+        activation: SpecActivation::HardGelu,
+        ..Spec::small(16, 8)
+    };
+    let flags = &[flag::GATE, flag::SKIP_PATH];
+    subjects.push(Subject {
+        name: "gate",
+        comment: "hard GELU",
+        flags,
+        spec: gate,
+    });
+
+    let one = Spec {
+        hidden: Vec::new(),
+        ..Spec::small(1, 1)
+    };
+    let comment = "one texel, no hidden layer";
+    subjects.push(Subject {
+        name: "one-texel",
+        comment,
+        flags: &[flag::ONE_TEXEL],
+        spec: one,
+    });
+
+    let linear = Spec {
+        shape: Shape {
+            outputs: vec![OutputFormat::Unorm16, OutputFormat::Snorm8],
+            ..Spec::small(32, 32).shape
+        },
+        activation: SpecActivation::Identity,
+        ..Spec::small(32, 32)
+    };
+    let comment = "no activation, arbitrary scales, sixteen bits out: a small error is seen";
+    let flags = &[flag::SKIP_PATH];
+    subjects.push(Subject {
+        name: "linear",
+        comment,
+        flags,
+        spec: linear,
+    });
+
+    let comment = "power-of-two scales, normative";
+    let flags = &[flag::SKIP_PATH, flag::TIES_EVERYWHERE];
+    subjects.push(ties("ties", Requantizer::Single, leaky, comment, flags));
+    let comment = "power-of-two scales, normative, no activation: ties on both sides of zero";
+    subjects.push(ties(
+        "ties-linear",
+        Requantizer::Single,
+        SpecActivation::Identity,
+        comment,
+        flags,
+    ));
+    let comment = "power-of-two scales, double rounding";
+    subjects.push(ties(
+        "ties-double",
+        Requantizer::Double,
+        relu,
+        comment,
+        alternate,
+    ));
+    let comment = "power-of-two scales, ties to even";
+    subjects.push(ties(
+        "ties-even",
+        Requantizer::HalfEven,
+        relu,
+        comment,
+        alternate,
+    ));
+    let comment = "power-of-two scales, ties away from zero";
+    subjects.push(ties(
+        "ties-away",
+        Requantizer::HalfAway,
+        leaky,
+        comment,
+        alternate,
+    ));
+    let mut narrow = ties(
+        "narrow",
+        Requantizer::Narrow,
+        relu,
+        "16-bit multipliers",
+        &[],
+    );
+    narrow.flags = &[
+        flag::ALTERNATE_PROFILE,
+        flag::SKIP_PATH,
+        flag::NARROW_MANTISSA,
+    ];
+    narrow.spec.has_ties = false;
+    subjects.push(narrow);
+    subjects
+}

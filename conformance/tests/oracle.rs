@@ -1,0 +1,155 @@
+//! The oracle by hand: one texel whose every number is worked out in the comments.
+
+use ntmu_conformance::bound::{typical, worst};
+use ntmu_conformance::synthetic::grid;
+use ntmu_conformance::{Device, ModelDevice, Oracle};
+use ntmu_isa::Asset;
+use ntmu_isa::activation::Activation;
+use ntmu_isa::asset::{Encoding, Map, Metadata, Parts};
+use ntmu_isa::layer::{Layer, Skip};
+use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::profile::Profile;
+use ntmu_isa::rescale::Multiplier;
+use ntmu_isa::shape::{OutputFormat, Shape};
+use ntmu_model::Request;
+
+fn layer(inputs: u16, weights: &[i8], bias: &[i32], scale: Multiplier) -> Layer {
+    Layer {
+        inputs,
+        outputs: bias.len() as u16,
+        weights: weights.to_vec(),
+        bias: bias.to_vec(),
+        scales: vec![scale; bias.len()],
+        zero_point: 0,
+        activation: Activation::Identity,
+        skip: None,
+    }
+}
+
+/// 16×8 texels, two mips, grids of one channel and 2×1 cells, one octave.
+fn by_hand() -> Asset {
+    let half = Multiplier::power_of_two(1);
+    // 3/8 = 3·2^29 / 2^32.
+    let three_eighths = Multiplier::new(3 << 29, 32).unwrap();
+    let mut first = layer(10, &[[1; 10], [-1; 10]].concat(), &[-4, 4], three_eighths);
+    (first.zero_point, first.activation) = (-128, Activation::Relu);
+    let mut second = layer(2, &[1, 0, 0, 1], &[128, 128], half);
+    second.skip = Some(Skip {
+        span: 1,
+        scale: Multiplier::power_of_two(2),
+    });
+    let third = layer(2, &[2, 3], &[7], Multiplier::power_of_two(0));
+    Asset::new(Parts {
+        shape: Shape {
+            width: 16,
+            height: 8,
+            mip_count: 2,
+            octaves: 1,
+            snap: CornerSnap::Cell,
+            address_mode: AddressMode::Wrap,
+            grids: [grid(1, 4, 3), grid(1, 4, 3)],
+            outputs: vec![OutputFormat::Unorm8],
+        },
+        profile: Profile::NORMATIVE,
+        // Values 8 and −4 sixteenths; 0 and 8 sixteenths.
+        grids: [vec![15, 3], vec![7, 15]],
+        weight_bits: 8,
+        layers: vec![first, second, third],
+        metadata: Metadata {
+            name: "by hand".into(),
+            maps: vec![Map {
+                name: "grey".into(),
+                first_channel: 0,
+                channel_count: 1,
+                encoding: Encoding::Linear,
+                bit_depth: 8,
+            }],
+            record: vec![],
+        },
+    })
+    .unwrap()
+}
+
+/// Texel (5, 0) of mip 0.
+///
+/// * x: g = 5.5/8 − ½ = 3/16: first corner 0, 3/16 in. y: g = 1/16 − ½ = −7/16: first corner −1,
+///   which wraps to the only row, 9/16 in. So both rows are the same row.
+/// * Grid 0: left 8/16 → 64/128, right −4/16 → −32/128.
+/// * Grid 1: 13/16·0 + 3/16·½ = 3/32 → 12/128.
+/// * Waves: x is 11/16 of a tile: 4·3/16 − 1 = −¼ → −32; a quarter on, 15/16: ¾ → 96. y is 1/16:
+///   4·7/16 − 1 = ¾ → 96; a quarter on, 5/16: −¼ → −32. Level of mip 0: 0.
+const INPUTS: [f64; 10] = [
+    64.0, -32.0, 64.0, -32.0, 12.0, -32.0, 96.0, 96.0, -32.0, 0.0,
+];
+
+#[test]
+fn the_oracle_gives_the_texel_worked_out_by_hand() {
+    let asset = by_hand();
+    let oracle = Oracle::new(&asset);
+    let request = Request::new(&asset.shape, 5, 0, 0).unwrap();
+    let taps = oracle.taps(request);
+    assert_eq!(taps.inputs, INPUTS);
+    // The inputs add up to 204.
+    assert_eq!(taps.layers[0].accumulators, [200.0, -200.0]);
+    assert_eq!(taps.layers[0].activated, [200.0, 0.0]);
+    // 200·3/8 − 128 and 0 − 128.
+    assert_eq!(taps.layers[0].outputs, [-53.0, -128.0]);
+    assert_eq!(taps.layers[1].accumulators, [75.0, 0.0]);
+    // 75/2 + (−53 + 128)/4 and 0 + 0.
+    assert_eq!(taps.layers[1].outputs, [56.25, 0.0]);
+    // 2·56.25 + 3·0 + 7.
+    assert_eq!(taps.layers[2].accumulators, [119.5]);
+    assert_eq!(taps.channels, [119.5]);
+    assert_eq!(oracle.texel(request), [119.5]);
+    assert_eq!(oracle.mip(0)[5], 119.5);
+}
+
+#[test]
+fn the_model_rounds_the_same_texel_to_the_code_worked_out_by_hand() {
+    let asset = by_hand();
+    let request = Request::new(&asset.shape, 5, 0, 0).unwrap();
+    // Ties up: 37.5 → 38, 18.75 → 19, so 57; 2·57 + 7 = 121.
+    assert_eq!(
+        ModelDevice.texel_codes(&asset, &[request]),
+        Ok(vec![vec![121]])
+    );
+}
+
+#[test]
+fn the_level_of_the_last_mip_is_the_largest_input_and_texels_of_mip_1_cover_four() {
+    let asset = by_hand();
+    let oracle = Oracle::new(&asset);
+    // Texel (2, 0) of mip 1: x is (2.5)·2/8 = 5/8 of a tile, g = 1/8: 2/16 in.
+    let inputs = oracle.inputs(Request::new(&asset.shape, 2, 0, 1).unwrap());
+    // 2/16·½·128 = 8; 4·1/8 − 1 = −½ → −64, 7/8: ½ → 64; y is 1/8: ½ → 64, 3/8: −½ → −64.
+    assert_eq!(inputs[4..], [8.0, -64.0, 64.0, 64.0, -64.0, 127.0]);
+}
+
+/// What the float terms of a bound add: at most 10 inputs · 10·128 · 2^−51 = 5.7e-12 in the first
+/// layer's sums, and less than that in all that follows.
+const FLOAT: f64 = 1e-11;
+
+#[test]
+fn the_worst_case_of_the_texel_is_the_one_worked_out_by_hand() {
+    let asset = by_hand();
+    let oracle = Oracle::new(&asset);
+    let taps = oracle.taps(Request::new(&asset.shape, 5, 0, 0).unwrap());
+    // Latents of four bits drop five bits in an interpolation: ½ on lane 4. The level: ½.
+    // Layer 0, row 0: (½ + ½)·3/8 + ½ = 7/8. Row 1 stays shut: −200 + 1 is below zero.
+    // Layer 1, row 0: 7/8·½ + ½ and on the skip path 7/8·¼ + ½: 53/32. Row 1: exact.
+    // Channel: 2·53/32 + ½ = 61/16.
+    let bound = worst::texel(&oracle, &taps);
+    assert!((bound[0] - 61.0 / 16.0).abs() < FLOAT, "{bound:?}");
+    assert!(worst::asset(&asset)[0] >= bound[0]);
+}
+
+#[test]
+fn the_typical_error_of_the_texel_is_the_one_worked_out_by_hand() {
+    let asset = by_hand();
+    let oracle = Oracle::new(&asset);
+    let taps = oracle.taps(Request::new(&asset.shape, 5, 0, 0).unwrap());
+    // The inputs are integers here. Derivatives of the channel: 1 at its own rounding, 2 at each of
+    // layer 1's two, 2·(½ + ¼) = 3/2 at layer 0's: (1 + 4 + 4 + 9/4) / 12.
+    let square = typical::texel(&oracle, &taps);
+    assert!((square[0] - 11.25 / 12.0).abs() < FLOAT, "{square:?}");
+}

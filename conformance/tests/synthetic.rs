@@ -1,0 +1,150 @@
+//! Synthetic assets: valid, deterministic, and exercising what they are for.
+
+use ntmu_conformance::Oracle;
+use ntmu_conformance::synthetic::{self, SpecActivation, arbitrary_spec};
+use ntmu_isa::Asset;
+use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::rescale::Requantizer;
+use ntmu_isa::round::Rounding;
+use ntmu_isa::shape::OutputFormat;
+use ntmu_model::Request;
+use std::collections::BTreeSet;
+
+#[test]
+fn the_same_spec_and_seed_give_the_same_bytes_and_another_seed_others() {
+    for seed in 0..20 {
+        let spec = arbitrary_spec(seed);
+        let bytes = |seed| synthetic::asset(&spec, seed).unwrap().to_bytes();
+        assert_eq!(bytes(seed), bytes(seed));
+        assert_ne!(bytes(seed), bytes(seed + 1));
+        assert_eq!(
+            Asset::from_bytes(&bytes(seed)).unwrap().to_bytes(),
+            bytes(seed)
+        );
+    }
+}
+
+#[test]
+fn three_hundred_seeds_cover_every_choice() {
+    let specs: Vec<_> = (0..300).map(arbitrary_spec).collect();
+    let all = |values: BTreeSet<String>, count: usize, what: &str| {
+        assert_eq!(values.len(), count, "{what}: {values:?}");
+    };
+    let names = |of: &dyn Fn(&synthetic::Spec) -> String| specs.iter().map(of).collect();
+    all(
+        names(&|s| s.shape.snap.name().into()),
+        CornerSnap::ALL.len(),
+        "snap",
+    );
+    all(
+        names(&|s| s.shape.address_mode.name().into()),
+        AddressMode::ALL.len(),
+        "address mode",
+    );
+    all(
+        names(&|s| s.shape.outputs[0].name().into()),
+        OutputFormat::ALL.len(),
+        "output",
+    );
+    all(
+        names(&|s| s.profile.input.name().into()),
+        Rounding::ALL.len(),
+        "input",
+    );
+    all(
+        names(&|s| s.profile.leak.name().into()),
+        Rounding::ALL.len(),
+        "leak",
+    );
+    all(
+        names(&|s| s.profile.requantize.name().into()),
+        Requantizer::ALL.len(),
+        "requantize",
+    );
+    all(
+        names(&|s| s.profile.skip.name().into()),
+        Requantizer::ALL.len(),
+        "skip",
+    );
+    all(
+        names(&|s| s.profile.output.name().into()),
+        Requantizer::ALL.len(),
+        "output",
+    );
+    all(names(&|s| s.shape.octaves.to_string()), 4, "octaves");
+    all(names(&|s| s.weight_bits.to_string()), 7, "weight bits");
+    for g in 0..2 {
+        all(
+            names(&|s| s.shape.grids[g].format.bits().to_string()),
+            8,
+            "bits",
+        );
+        all(
+            names(&|s| s.shape.grids[g].scale_log2.to_string()),
+            3,
+            "scale",
+        );
+    }
+    all(names(&|s| s.blocks.to_string()), 4, "blocks");
+    all(names(&|s| s.block_span.to_string()), 3, "span");
+    all(names(&|s| s.hidden.len().to_string()), 4, "hidden layers");
+    // Identity, ReLU, hard GELU, and seven slopes of a leaky ReLU.
+    all(names(&|s| format!("{:?}", s.activation)), 10, "activation");
+    assert!(
+        specs
+            .iter()
+            .any(|s| s.activation == SpecActivation::Leaky(7))
+    );
+}
+
+/// Lanes that never change over a chain, and the share of saturated activations.
+#[test]
+fn activations_use_their_range_and_channels_vary() {
+    let (mut lanes, mut wide, mut values, mut saturated) = (0, 0, 0, 0);
+    for seed in 0..60 {
+        let mut spec = arbitrary_spec(seed);
+        (spec.shape.width, spec.shape.height) = (24, 24);
+        spec.shape.mip_count = 5;
+        let asset = synthetic::asset(&spec, seed).unwrap();
+        let oracle = Oracle::new(&asset);
+        let requests: Vec<Request> = (0..5)
+            .flat_map(|mip| Request::blocks(&asset.shape, mip))
+            .step_by(5)
+            .collect();
+        let taps: Vec<_> = requests
+            .iter()
+            .map(|&request| oracle.taps(request))
+            .collect();
+        for channel in 0..asset.shape.outputs.len() {
+            let (low, high) = span(taps.iter().map(|t| t.channels[channel]));
+            assert!(
+                high - low >= 16.0,
+                "seed {seed} channel {channel}: {low}..{high}"
+            );
+        }
+        for layer in 0..asset.layers.len() - 1 {
+            for row in 0..usize::from(asset.layers[layer].outputs) {
+                let (low, high) = span(taps.iter().map(|t| t.layers[layer].outputs[row]));
+                lanes += 1;
+                wide += usize::from(high - low >= 64.0);
+                values += taps.len();
+                let edge =
+                    |t: &ntmu_conformance::oracle::RealTaps| t.layers[layer].outputs[row] == 127.0;
+                saturated += taps.iter().filter(|t| edge(t)).count();
+            }
+        }
+    }
+    // Three quarters of the lanes use at least a quarter of their range; saturation happens, and
+    // is the exception.
+    assert!(wide * 4 >= lanes * 3, "{wide} of {lanes}");
+    assert!(
+        saturated > 0 && saturated * 10 < values,
+        "{saturated} of {values}"
+    );
+}
+
+fn span(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+        (low.min(v), high.max(v))
+    })
+}

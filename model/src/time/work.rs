@@ -1,0 +1,176 @@
+//! Work: what one texel asks of each resource, read off the program.
+
+use ntmu_isa::instruction::Instruction;
+use ntmu_isa::{Asset, Program};
+
+/// One multiplication of a vector by a layer's weights, and what is done to its accumulators.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Dense {
+    /// The layer.
+    pub layer: u16,
+    /// Lanes of the vector multiplied.
+    pub inputs: u32,
+    /// Accumulators made.
+    pub outputs: u32,
+    /// Slots of a requantiser lane per texel: a slot is one wide multiplication.
+    pub requantizer_slots: u32,
+    /// Bytes read from the residual store per texel.
+    pub skip_reads: u32,
+    /// Bytes of the layer's parameters: weights at the asset's width, and 9 for each row (a 32-bit
+    /// bias, a 31-bit mantissa and a 6-bit shift; see [`ntmu_isa::asset::Asset::parameter_bits`]).
+    pub parameter_bytes: u64,
+}
+
+impl Dense {
+    /// Multiplications per texel.
+    #[must_use]
+    pub fn macs(&self) -> u64 {
+        u64::from(self.inputs) * u64::from(self.outputs)
+    }
+}
+
+/// What one texel asks of each resource.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Grid positions.
+    pub positions: u32,
+    /// Fetches: four corners each.
+    pub fetches: u32,
+    /// Latents unpacked, of all corners.
+    pub unpacked: u32,
+    /// Latents interpolated.
+    pub interpolated: u32,
+    /// Waves and levels computed.
+    pub embedded: u32,
+    /// The layers, in program order.
+    pub dense: Vec<Dense>,
+    /// Channels emitted.
+    pub channels: u32,
+}
+
+/// Slots of a requantiser lane that an accumulator takes.
+///
+/// A slot is one pass of the lane's multiplier. A ReLU or a leak is a comparator and a shifter in
+/// front of it and takes none. A hard GELU takes two: to its 8.8 argument, and the product with the
+/// gate; the `rescale` that follows takes its own.
+const RELU_SLOTS: u32 = 0;
+const GATE_SLOTS: u32 = 2;
+const RESCALE_SLOTS: u32 = 1;
+
+/// What one texel asks of each resource when `program` decodes it. The program was compiled for, or
+/// linked to, this asset.
+#[must_use]
+pub fn work_of(asset: &Asset, program: &Program) -> Work {
+    let mut work = Work::default();
+    let channels = |grid: u16| u32::from(asset.shape.grids[usize::from(grid)].channels);
+    for instruction in program.instructions() {
+        match *instruction {
+            Instruction::Position { grid: _ } => work.positions += 1,
+            Instruction::Fetch { grid: _ } => work.fetches += 1,
+            Instruction::Concat {
+                dst: _,
+                lane: _,
+                grid,
+            } => work.unpacked += 4 * channels(grid),
+            Instruction::Lerp {
+                dst: _,
+                lane: _,
+                grid,
+            } => {
+                work.unpacked += 4 * channels(grid);
+                work.interpolated += channels(grid);
+            }
+            Instruction::Wave {
+                dst: _,
+                lane: _,
+                octaves,
+            } => {
+                work.embedded += u32::from(ntmu_isa::embed::WAVES_PER_OCTAVE * octaves);
+            }
+            Instruction::Level { dst: _, lane: _ } => work.embedded += 1,
+            Instruction::Dense {
+                layer,
+                src: _,
+                inputs,
+                outputs,
+            } => {
+                let macs = u64::from(inputs) * u64::from(outputs);
+                let weights = (macs * u64::from(asset.weight_bits)).div_ceil(8);
+                work.dense.push(Dense {
+                    layer,
+                    inputs: u32::from(inputs),
+                    outputs: u32::from(outputs),
+                    requantizer_slots: 0,
+                    skip_reads: 0,
+                    parameter_bytes: weights + 9 * u64::from(outputs),
+                });
+            }
+            Instruction::Relu { outputs } | Instruction::Leaky { shift: _, outputs } => {
+                work.requantize(RELU_SLOTS, outputs);
+            }
+            Instruction::Gate { layer: _, outputs } => work.requantize(GATE_SLOTS, outputs),
+            Instruction::Rescale {
+                layer: _,
+                dst: _,
+                outputs,
+            } => {
+                work.requantize(RESCALE_SLOTS, outputs);
+            }
+            Instruction::RescaleSkip {
+                layer: _,
+                dst: _,
+                skip: _,
+                outputs,
+            } => {
+                // The skip path's own multiplier sits at the port of the residual store.
+                work.requantize(RESCALE_SLOTS, outputs);
+                if let Some(dense) = work.dense.last_mut() {
+                    dense.skip_reads += u32::from(outputs);
+                }
+            }
+            Instruction::Emit { layer: _, outputs } => {
+                work.requantize(RESCALE_SLOTS, outputs);
+                work.channels += u32::from(outputs);
+            }
+            Instruction::End {} => {}
+        }
+    }
+    work
+}
+
+impl Work {
+    /// Accumulators are the last `dense`'s; a linked program has one before it touches any.
+    fn requantize(&mut self, slots: u32, outputs: u16) {
+        if let Some(dense) = self.dense.last_mut() {
+            dense.requantizer_slots += slots * u32::from(outputs);
+        }
+    }
+
+    /// Multiplications per texel.
+    #[must_use]
+    pub fn macs(&self) -> u64 {
+        self.dense.iter().map(Dense::macs).sum()
+    }
+
+    /// Slots of requantiser lanes per texel.
+    #[must_use]
+    pub fn requantizer_slots(&self) -> u64 {
+        self.dense
+            .iter()
+            .map(|dense| u64::from(dense.requantizer_slots))
+            .sum()
+    }
+
+    /// Bytes of parameters that the program reads, each layer's once.
+    #[must_use]
+    pub fn parameter_bytes(&self) -> u64 {
+        let mut layers: Vec<(u16, u64)> = self
+            .dense
+            .iter()
+            .map(|dense| (dense.layer, dense.parameter_bytes))
+            .collect();
+        layers.sort_unstable();
+        layers.dedup();
+        layers.iter().map(|layer| layer.1).sum()
+    }
+}

@@ -1,0 +1,222 @@
+//! What `ntmu encode` does in a build that has the trainer.
+
+use super::Encode;
+use crate::Verdict;
+use crate::{console, files};
+use anyhow::Context as _;
+use indicatif::{ProgressBar, ProgressStyle};
+use ntmu::decoded::Decoded;
+use ntmu::isa::Asset;
+use ntmu::isa::asset::Map;
+use ntmu::isa::shape::OutputFormat;
+use ntmu::quality::{self, Quality};
+use ntmu::texture_set::TextureSet;
+use ntmu::trainer::{self, Preset, Progress, Source, TrainConfig, TrainError, Trained};
+use ntmu::built_in;
+use serde_json::json;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Named efforts, as block encoders name them.
+const EFFORTS: [(&str, u8); 5] =
+    [("fastest", 0), ("fast", 10), ("medium", 50), ("thorough", 80), ("exhaustive", 100)];
+
+impl Encode {
+    pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
+        let config = self.config()?;
+        let set = match &self.source {
+            Some(path) if !self.built_in => TextureSet::read(path)?,
+            _ => built_in::source(),
+        };
+        for skipped in &set.skipped {
+            console::note(&format!("left out {}: {}", skipped.file, skipped.reason));
+        }
+        let checkpoint = self.checkpoint_path();
+        let source = source_of(&set);
+        let started = Instant::now();
+        let stop = stop_on_interrupt()?;
+        let line = Line::new();
+        let trained = trainer::train(
+            &source,
+            &config,
+            Some(&checkpoint),
+            self.resume,
+            &stop,
+            &mut |progress| line.show(progress),
+        );
+        line.bar.finish_and_clear();
+        let trained = match trained {
+            Ok(trained) => trained,
+            Err(error @ TrainError::Stopped { .. }) => {
+                console::note(&format!("{error}\nthe same command with --resume continues"));
+                return Ok(Verdict::Failed);
+            }
+            Err(error) => return Err(error.into()),
+        };
+        files::write(&self.output, &trained.asset.to_bytes())?;
+        if checkpoint.exists() {
+            std::fs::remove_file(&checkpoint)
+                .with_context(|| format!("cannot remove {}", checkpoint.display()))?;
+        }
+        let reals = Decoded::of(&trained.asset, |_| ()).reals(&trained.asset.shape);
+        let quality = Quality::measure(&source.mips, &reals, &quality::maps_of(&trained.asset))?;
+        self.report(json, &trained, &quality, started.elapsed())?;
+        Ok(Verdict::Fine)
+    }
+
+    fn checkpoint_path(&self) -> PathBuf {
+        self.checkpoint.clone().unwrap_or_else(|| {
+            let mut name = self.output.clone().into_os_string();
+            name.push(".checkpoint");
+            PathBuf::from(name)
+        })
+    }
+
+    fn config(&self) -> anyhow::Result<TrainConfig> {
+        let mut config = Preset::by_name(&self.preset)?.config();
+        let named = EFFORTS.iter().find(|(name, _)| *name == self.effort).map(|(_, effort)| *effort);
+        let effort = named.or_else(|| self.effort.parse().ok().filter(|&effort| effort <= 100));
+        let names = EFFORTS.map(|(name, _)| name).join(", ");
+        let effort = effort
+            .with_context(|| format!("effort: found {:?}; allowed: 0 to 100, {names}", self.effort))?;
+        config.effort = effort;
+        config.seed = self.seed;
+        if let Some(hidden) = &self.hidden {
+            config.hidden.clone_from(hidden);
+        }
+        if let Some(blocks) = self.blocks {
+            config.residual_blocks = blocks;
+        }
+        if let Some(channels) = &self.grids {
+            let [first, second] = channels.as_slice() else {
+                anyhow::bail!("grids: found {} numbers; allowed: two, `8,16`", channels.len());
+            };
+            config.grids[0].channels = *first;
+            config.grids[1].channels = *second;
+        }
+        if let Some(bits) = self.latent_bits {
+            config.grids[0].bits = bits;
+            config.grids[1].bits = bits;
+        }
+        if let Some(bits) = self.weight_bits {
+            config.weight_bits = bits;
+        }
+        config.validate()?;
+        Ok(config)
+    }
+
+    fn report(
+        &self,
+        json: bool,
+        trained: &Trained,
+        quality: &Quality,
+        elapsed: Duration,
+    ) -> anyhow::Result<()> {
+        let rate = quality::bppc(&trained.asset);
+        let report = &trained.report;
+        if json {
+            return console::print_json(&json!({
+                "output": self.output, "quality": quality, "bppc": rate, "training": report,
+                "seconds": elapsed.as_secs_f64(),
+            }));
+        }
+        console::print(&super::super::compare::table(quality));
+        console::print(&format!(
+            "{:.4} bits per pixel and channel, parameters counted; {} multiplications per texel\n\
+             float network {:.2} dB, deployed integers {:.2} dB ({:+.2})\n\
+             {} in {:.0} s",
+            rate,
+            trained.asset.macs(),
+            report.psnr_float,
+            quality.overall.psnr,
+            quality.overall.psnr - report.psnr_float,
+            self.output.display(),
+            elapsed.as_secs_f64()
+        ));
+        Ok(())
+    }
+}
+
+/// The first interrupt asks the trainer to stop, which leaves a checkpoint; a second ends the
+/// program at once.
+fn stop_on_interrupt() -> anyhow::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::SeqCst) {
+            std::process::abort();
+        }
+        console::note("\nstopping; once more to stop without a checkpoint");
+    })
+    .context("cannot watch for interrupts")?;
+    Ok(stop)
+}
+
+/// A texture set as the trainer takes it.
+fn source_of(set: &TextureSet) -> Source {
+    let mut maps: Vec<Map> = Vec::new();
+    let mut outputs = Vec::new();
+    for map in &set.maps {
+        let name = unused(&plain_name(&map.name), &maps);
+        // A map stored at more than 8 bits leaves the unit at 16.
+        let format = if map.bit_depth == 8 { OutputFormat::Unorm8 } else { OutputFormat::Unorm16 };
+        outputs.extend(std::iter::repeat_n(format, map.channel_count));
+        maps.push(Map {
+            name,
+            first_channel: map.first_channel as u16,
+            channel_count: map.channel_count as u16,
+            encoding: map.encoding,
+            bit_depth: map.bit_depth,
+        });
+    }
+    Source { name: set.name.clone(), mips: set.texels.clone(), outputs, maps }
+}
+
+/// A map's name as the format allows it: it becomes a file name.
+fn plain_name(name: &str) -> String {
+    let plain = |c: char| {
+        if c.is_ascii_alphanumeric() || c == '_' || c == '-' { c } else { '_' }
+    };
+    let name: String = name.chars().map(plain).take(60).collect();
+    if name.is_empty() { "map".to_owned() } else { name }
+}
+
+/// The name, with a number where another map has it.
+fn unused(name: &str, maps: &[Map]) -> String {
+    let is_free = |candidate: &str| maps.iter().all(|map| map.name != candidate);
+    if is_free(name) {
+        return name.to_owned();
+    }
+    let numbered = (2..).map(|number| format!("{name}_{number}")).find(|n| is_free(n));
+    numbered.unwrap_or_else(|| name.to_owned())
+}
+
+/// The progress line: stage, step, loss, PSNR estimate, time left.
+struct Line {
+    bar: ProgressBar,
+}
+
+impl Line {
+    fn new() -> Line {
+        let bar = ProgressBar::new(1);
+        let template = "{prefix:8} {bar:24} {pos}/{len}  {msg}  {elapsed} + {eta}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        Line { bar }
+    }
+
+    fn show(&self, progress: &Progress) {
+        if self.bar.prefix() != progress.stage.name() {
+            // The steps of the stages cost differently: time left is that of the stage under way.
+            self.bar.set_prefix(progress.stage.name());
+            self.bar.set_length(progress.stage_steps);
+            self.bar.reset_eta();
+        }
+        self.bar.set_position(progress.step);
+        let loss = progress.loss;
+        self.bar.set_message(format!("loss {loss:.2e}  about {:.2} dB", progress.psnr));
+    }
+}

@@ -1,0 +1,121 @@
+//! A study small enough to know every figure of it.
+
+mod page;
+mod parts;
+
+use super::MapPicture;
+use crate::quality::{Figures, MapQuality, Quality};
+use crate::study::{AssetStudy, Charge, OracleStudy, Study, SweepPoint, TimingRow, TwinStudy};
+use ndarray::Array3;
+
+fn charge(cause: &str, cycles: u64) -> Charge {
+    Charge {
+        cause: cause.to_owned(),
+        cycles,
+    }
+}
+
+fn row(unit: &str, layout: &str, ledger: Vec<Charge>) -> TimingRow {
+    let cycles = ledger.iter().map(|charge| charge.cycles).sum();
+    TimingRow {
+        unit: unit.to_owned(),
+        layout: layout.to_owned(),
+        texels: 160,
+        cycles,
+        cycles_per_block: cycles as f64 / 10.0,
+        closed_form_per_block: 31.41,
+        bytes_per_block: 27.18,
+        hit_rate: 0.9371,
+        mac_utilisation: 0.6113,
+        mtexels_per_second: 1234.56,
+        bottleneck: "MAC array".to_owned(),
+        ledger,
+    }
+}
+
+fn figures(psnr: f64, ssim: f64) -> Figures {
+    Figures { psnr, ssim }
+}
+
+fn study() -> Study {
+    let map = MapQuality {
+        map: "color".to_owned(),
+        mips: vec![figures(34.567, 0.91234), figures(f64::INFINITY, 1.0)],
+        overall: figures(35.11, 0.92),
+    };
+    Study {
+        asset: AssetStudy {
+            name: "brick-wall".to_owned(),
+            size: (8, 4),
+            mips: 2,
+            channels: 3,
+            texels: 40,
+            latent_bits: [3, 5],
+            weight_bits: 7,
+            macs_per_texel: 5376,
+            grid_bytes: 36_864,
+            parameter_bytes: 5712,
+            bppc: 0.5774,
+        },
+        quality: Some(Quality {
+            maps: vec![map],
+            mips: vec![figures(33.33, 0.8765), figures(32.22, 0.8654)],
+            overall: figures(31.11, 0.8543),
+        }),
+        oracle: OracleStudy {
+            codes: 786_429,
+            histogram: vec![(-1, 4210), (0, 777_017), (1, 5202)],
+            max: 1.83,
+            rms: 0.2961,
+            typical: 0.2914,
+            bound: 41.7,
+        },
+        twin: TwinStudy::Ran {
+            adapter: "some adapter".to_owned(),
+            codes: 786_429,
+            differing: 0,
+            first: None,
+        },
+        timing: vec![
+            row(
+                "small",
+                "linear",
+                vec![charge("compute", 400), charge("latent-miss", 57)],
+            ),
+            row(
+                "small",
+                "tiled",
+                vec![charge("weight-fill", 3), charge("compute", 401)],
+            ),
+        ],
+        sweep: [
+            (4, 8, 34.25, 0.577),
+            (4, 6, 33.5, 0.561),
+            (3, 8, 29.75, 0.455),
+        ]
+        .map(|(latent_bits, weight_bits, psnr, bppc)| SweepPoint {
+            latent_bits,
+            weight_bits,
+            psnr,
+            bppc,
+        })
+        .to_vec(),
+    }
+}
+
+fn ramp(channels: usize, rows: usize, columns: usize) -> Array3<f32> {
+    let texels = (channels * rows * columns) as f32;
+    let mut next = 0.0;
+    Array3::from_shape_simple_fn((channels, rows, columns), || {
+        next += 1.0;
+        next / texels
+    })
+}
+
+fn picture<'a>(source: Option<&'a Array3<f32>>, decoded: &'a Array3<f32>) -> MapPicture<'a> {
+    MapPicture {
+        map: "color",
+        source: source.map(|texels| texels.view()),
+        decoded: decoded.view(),
+    }
+}

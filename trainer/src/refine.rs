@@ -1,0 +1,150 @@
+//! The stages on the whole set: latents and synthesizer, in reals and then in integers.
+
+use crate::adam::Rate;
+use crate::calibrate::calibrate;
+use crate::engine::{Engine, View};
+use crate::evaluate::{Errors, evaluate};
+use crate::integer::{Quantised, Range, quantise};
+use crate::latents::Rounding;
+use crate::model::{Ground, Model};
+use crate::network::Network;
+use crate::random::{Purpose, Stream};
+use crate::sampler::{Numbers, Window};
+use crate::schedule::Stage;
+
+/// Texels that calibrate the activations.
+const CALIBRATION: usize = 4096;
+
+/// The numbers of a stage's random streams: no two stages share one.
+const fn stream_step(stage: Stage, step: u64) -> u64 {
+    ((stage as u64) << 48) | step
+}
+
+/// The learning rates of one step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rates {
+    pub(crate) latents: f64,
+    pub(crate) synthesizer: f64,
+}
+
+impl Model {
+    /// What the unit would show of the latents.
+    fn show(&mut self, rounding: impl Fn(u32) -> Rounding) {
+        for (g, latents) in self.latents.iter_mut().enumerate() {
+            latents.show(rounding(g as u32));
+        }
+    }
+
+    fn seen(&self) -> [&[f32]; 2] {
+        [&self.latents[0].seen, &self.latents[1].seen]
+    }
+
+    /// The integers of the present parameters.
+    pub(crate) fn quantised(&self, ground: &Ground<'_>) -> Quantised {
+        quantise(
+            &ground.topology,
+            &self.parameters,
+            &self.ranges,
+            ground.config.weight_bits,
+            ground.outputs(),
+        )
+    }
+
+    fn real(&self, ground: &Ground<'_>) -> Network {
+        Network::real(&ground.topology, &self.parameters, &ground.low)
+    }
+
+    /// Fixes the ranges of the hidden layers.
+    pub(crate) fn calibrate(&mut self, ground: &Ground<'_>) {
+        self.ranges = self.measured_ranges(ground);
+    }
+
+    fn measured_ranges(&mut self, ground: &Ground<'_>) -> Vec<Range> {
+        self.show(|_| Rounding::Nearest);
+        let stream = Stream::new(ground.config.seed, Purpose::Calibration, 0);
+        let texels: Vec<_> = (0..CALIBRATION as u64)
+            .map(|i| {
+                let uniform = ground.config.uniform_mips;
+                crate::batch::draw_texel(stream, i, &ground.texels.sizes, uniform)
+            })
+            .collect();
+        let network = self.real(ground);
+        let windows = [Window::whole(&ground.positions)];
+        let view = self.view(ground, &network, Numbers::Real, &windows);
+        calibrate(&ground.topology, view, &texels)
+    }
+
+    fn view<'v>(
+        &'v self,
+        ground: &'v Ground<'_>,
+        network: &'v Network,
+        numbers: Numbers,
+        windows: &'v [Window],
+    ) -> View<'v> {
+        View {
+            network,
+            embedding: ground.embedding(numbers),
+            positions: &ground.positions,
+            windows,
+            seen: self.seen(),
+            texels: &ground.texels,
+        }
+    }
+
+    /// One step of a stage on the whole set; the mean squared error of its batch.
+    pub(crate) fn step(
+        &mut self,
+        ground: &Ground<'_>,
+        engine: &mut Engine,
+        stage: Stage,
+        step: u64,
+        rates: Rates,
+    ) -> f64 {
+        let at = stream_step(stage, step);
+        let config = ground.config;
+        let quantised = (stage == Stage::Integer).then(|| self.quantised(ground));
+        let numbers = if quantised.is_some() { Numbers::Integer } else { Numbers::Real };
+        let noise = Stream::new(config.seed, Purpose::Noise, at).noise_key();
+        self.show(|grid| match numbers {
+            Numbers::Real => Rounding::Noise(noise.wrapping_add(grid)),
+            Numbers::Integer => Rounding::Nearest,
+        });
+        let stream = Stream::new(config.seed, Purpose::Batch, at);
+        engine.batch.draw(stream, &ground.texels.sizes, config.uniform_mips);
+        let windows = [Window::whole(&ground.positions)];
+        let loss = match &quantised {
+            Some(q) => engine.step(self.view(ground, &q.network, numbers, &windows)),
+            None => {
+                let network = self.real(ground);
+                engine.step(self.view(ground, &network, numbers, &windows))
+            }
+        };
+        if let Some(q) = &quantised {
+            q.to_real_gradient(&ground.topology, &mut engine.parameters);
+        }
+        let rate = Rate::new(rates.synthesizer, step + 1);
+        self.moments.update(rate, &mut self.parameters, &engine.parameters);
+        if config.refine_latents {
+            let embedding = ground.embedding(numbers);
+            let [g0, g1] = &mut self.latents;
+            engine.scatter(embedding, [&mut g0.gradient, &mut g1.gradient]);
+            for (latents, unit) in self.latents.iter_mut().zip(embedding.latent_unit()) {
+                // The configured rate counts reals; the values count codes.
+                let codes = f64::from(1_u32 << latents.format.bits());
+                latents.update(Rate::new(rates.latents * codes, step + 1), unit);
+            }
+        }
+        loss
+    }
+
+    /// The error over every texel, in reals or in the asset's integers.
+    pub(crate) fn evaluate(&mut self, ground: &Ground<'_>, numbers: Numbers) -> Errors {
+        self.show(|_| Rounding::Nearest);
+        let network = match numbers {
+            Numbers::Real => self.real(ground),
+            Numbers::Integer => self.quantised(ground).network,
+        };
+        let windows = [Window::whole(&ground.positions)];
+        evaluate(&ground.topology, self.view(ground, &network, numbers, &windows))
+    }
+}

@@ -1,0 +1,121 @@
+//! Schedule: how many steps each stage has, and the learning rate at each of them.
+
+use crate::config::{Steps, TrainConfig};
+use serde::{Deserialize, Serialize};
+
+/// The stages, in the order in which they run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stage {
+    /// Encoder, constructors and synthesizer on crops.
+    Encoder,
+    /// Latents and synthesizer on the whole set.
+    Refine,
+    /// Latents and the integer synthesizer.
+    Integer,
+}
+
+impl Stage {
+    /// Every stage, in order.
+    pub const ALL: [Stage; 3] = [Stage::Encoder, Stage::Refine, Stage::Integer];
+
+    /// The name in progress lines, errors and records.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Stage::Encoder => "encoder",
+            Stage::Refine => "refine",
+            Stage::Integer => "integer",
+        }
+    }
+}
+
+impl Steps {
+    /// Steps of one stage.
+    #[must_use]
+    pub const fn of(&self, stage: Stage) -> u64 {
+        match stage {
+            Stage::Encoder => self.encoder,
+            Stage::Refine => self.refine,
+            Stage::Integer => self.integer,
+        }
+    }
+
+    /// Steps of all stages.
+    #[must_use]
+    pub const fn total(&self) -> u64 {
+        self.encoder + self.refine + self.integer
+    }
+}
+
+/// Passes over all texels of all mips in the refinement and the integer stage together, at
+/// efforts 0, 10, 50 and 100; between them the logarithm is interpolated.
+const PASSES: [(f64, f64); 4] = [(0.0, 8.0), (10.0, 30.0), (50.0, 240.0), (100.0, 1200.0)];
+
+/// The share of those passes that the integer stage has.
+const INTEGER_SHARE: f64 = 0.25;
+
+/// The least steps of the two stages together, for sets smaller than a batch.
+const LEAST: f64 = 400.0;
+
+/// The steps of each stage for a set of `texels` texels in all its mips.
+pub(crate) fn steps(config: &TrainConfig, texels: u64) -> Steps {
+    if let Some(steps) = config.steps {
+        return steps;
+    }
+    let passes = interpolate(&PASSES, f64::from(config.effort));
+    let steps = (passes * texels as f64 / f64::from(config.batch)).max(LEAST).round();
+    let integer = (INTEGER_SHARE * steps).round();
+    Steps { encoder: 0, refine: (steps - integer) as u64, integer: integer as u64 }
+}
+
+/// The logarithm of the second number, linear in the first.
+fn interpolate(points: &[(f64, f64)], at: f64) -> f64 {
+    for pair in points.windows(2) {
+        let [(x0, y0), (x1, y1)] = [pair[0], pair[1]];
+        if at <= x1 {
+            return y0 * (y1 / y0).powf((at - x0) / (x1 - x0));
+        }
+    }
+    points.last().map_or(1.0, |p| p.1)
+}
+
+/// Steps over which a rate rises from nothing.
+const WARM_UP: f64 = 100.0;
+
+/// What is left of a rate at the end of a stage that falls to the floor.
+const FLOOR: f64 = 0.01;
+
+/// The factor of a learning rate at a share `at` of 0..=1 of a fall along half a cosine.
+pub(crate) fn fall(at: f64) -> f64 {
+    FLOOR + (1.0 - FLOOR) * 0.5 * (1.0 + (std::f64::consts::PI * at.clamp(0.0, 1.0)).cos())
+}
+
+/// The factor at step `step` (from 0) of `steps`, with a warm-up of at most a tenth of them.
+pub(crate) fn factor(step: u64, steps: u64) -> f64 {
+    let warm = WARM_UP.min(0.1 * steps as f64).max(1.0);
+    let rise = ((step + 1) as f64 / warm).min(1.0);
+    rise * fall(step as f64 / steps.max(1) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_factor_rises_falls_and_stays_positive() {
+        let of = |step| factor(step, 10_000);
+        assert!(of(0) < of(50) && of(50) < of(100));
+        assert!(of(100) > of(5000) && of(5000) > of(9999));
+        assert!((0..10_000).all(|s| of(s) > 0.0 && of(s) <= 1.0));
+        assert!(factor(0, 1) > 0.0);
+    }
+
+    #[test]
+    fn interpolation_meets_its_points() {
+        for (x, y) in PASSES {
+            assert!((interpolate(&PASSES, x) - y).abs() < 1e-9 * y);
+        }
+        assert!(interpolate(&PASSES, 30.0) > 30.0 && interpolate(&PASSES, 30.0) < 240.0);
+    }
+}
