@@ -35,11 +35,12 @@ pub(crate) fn complain(error: &anyhow::Error) {
     note(&format!("ntmu: {error:#}"));
 }
 
-/// A table whose first column is left-aligned and whose others are right-aligned.
+/// A Markdown table, so that it can be pasted; its first column is left-aligned, the others
+/// right-aligned.
 pub(crate) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table
-        .load_preset(presets::UTF8_HORIZONTAL_ONLY)
+        .load_preset(presets::ASCII_MARKDOWN)
         .set_header(header.to_vec());
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);

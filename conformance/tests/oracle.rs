@@ -30,7 +30,7 @@ fn layer(inputs: u16, weights: &[i8], bias: &[i32], scale: Multiplier) -> Layer 
 fn by_hand() -> Asset {
     let half = Multiplier::power_of_two(1);
     // 3/8 = 3·2^29 / 2^32.
-    let three_eighths = Multiplier::new(3 << 29, 32).unwrap();
+    let three_eighths = Multiplier::new(3 << 29, 32).expect("normalised");
     let mut first = layer(10, &[[1; 10], [-1; 10]].concat(), &[-4, 4], three_eighths);
     (first.zero_point, first.activation) = (-128, Activation::Relu);
     let mut second = layer(2, &[1, 0, 0, 1], &[128, 128], half);
@@ -67,7 +67,7 @@ fn by_hand() -> Asset {
             record: vec![],
         },
     })
-    .unwrap()
+    .expect("a valid asset")
 }
 
 /// Texel (5, 0) of mip 0.

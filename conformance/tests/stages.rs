@@ -18,7 +18,7 @@ fn any_texel(asset: &Asset, seed: u64) -> Request {
     let (width, height) = asset.shape.mip_size(mip);
     let x = random.within(0, width as i32 - 1) as u32;
     let y = random.within(0, height as i32 - 1) as u32;
-    Request::new(&asset.shape, x, y, mip).unwrap()
+    Request::new(&asset.shape, x, y, mip).expect("within the mip")
 }
 
 fn within(what: &str, model: &[f64], oracle: &[f64], bounds: &[f64]) {
@@ -121,7 +121,7 @@ fn check(asset: &Asset, request: Request) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn every_stage_of_any_texel_of_any_asset_is_within_its_bound(

@@ -1,7 +1,7 @@
 //! Synthetic assets: valid, deterministic, and exercising what they are for.
 
 use ntmu_conformance::Oracle;
-use ntmu_conformance::synthetic::{self, SpecActivation, arbitrary_spec};
+use ntmu_conformance::synthetic::{self, Spec, SpecActivation, arbitrary_spec};
 use ntmu_isa::Asset;
 use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::rescale::Requantizer;
@@ -30,7 +30,7 @@ fn three_hundred_seeds_cover_every_choice() {
     let all = |values: BTreeSet<String>, count: usize, what: &str| {
         assert_eq!(values.len(), count, "{what}: {values:?}");
     };
-    let names = |of: &dyn Fn(&synthetic::Spec) -> String| specs.iter().map(of).collect();
+    let names = |of: &dyn Fn(&Spec) -> String| specs.iter().map(of).collect();
     all(
         names(&|s| s.shape.snap.name().into()),
         CornerSnap::ALL.len(),
@@ -88,6 +88,7 @@ fn three_hundred_seeds_cover_every_choice() {
     all(names(&|s| s.blocks.to_string()), 4, "blocks");
     all(names(&|s| s.block_span.to_string()), 3, "span");
     all(names(&|s| s.hidden.len().to_string()), 4, "hidden layers");
+    all(names(&|s| format!("{:?}", s.scale)), 3, "scale");
     // Identity, ReLU, hard GELU, and seven slopes of a leaky ReLU.
     all(names(&|s| format!("{:?}", s.activation)), 10, "activation");
     assert!(
@@ -147,4 +148,20 @@ fn span(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
         (low.min(v), high.max(v))
     })
+}
+
+#[test]
+fn a_spec_outside_the_limits_is_refused_by_name() {
+    let refused = |change: &dyn Fn(&mut Spec)| {
+        let mut spec = Spec::small(8, 8);
+        change(&mut spec);
+        synthetic::asset(&spec, 1).unwrap_err().to_string()
+    };
+    assert!(refused(&|s| s.shape.width = 0).starts_with("shape.width"));
+    assert!(refused(&|s| s.shape.outputs.clear()).starts_with("shape.channels"));
+    assert!(refused(&|s| s.weight_bits = 0).starts_with("spec.weight_bits"));
+    assert!(refused(&|s| s.block_span = 0).starts_with("spec.block_span"));
+    assert!(refused(&|s| s.hidden = vec![0]).starts_with("spec.hidden"));
+    assert!(refused(&|s| s.hidden = vec![1; 64]).starts_with("spec.layers"));
+    assert!(refused(&|s| s.activation = SpecActivation::Leaky(8)).contains("leak_shift"));
 }

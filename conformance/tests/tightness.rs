@@ -4,7 +4,7 @@ use ntmu_conformance::bound::{self, stage, typical};
 use ntmu_conformance::histogram::Histogram;
 use ntmu_conformance::oracle::reals;
 use ntmu_conformance::suite;
-use ntmu_conformance::synthetic::{self, Spec, SpecActivation, grid};
+use ntmu_conformance::synthetic::{self, Spec, SpecActivation, SpecScale, grid};
 use ntmu_conformance::vector::{Answer, Query};
 use ntmu_conformance::{Oracle, bound::worst};
 use ntmu_isa::layout::Layout;
@@ -140,7 +140,7 @@ fn a_gates_argument_rounding_comes_near_its_bound() {
 #[test]
 fn a_skip_paths_two_roundings_come_near_one_lsb() {
     let mut spec = Spec::small(32, 32);
-    spec.has_ties = true;
+    spec.scale = SpecScale::PowerOfTwo;
     spec.activation = SpecActivation::Identity;
     let asset = synthetic::asset(&spec, 5).unwrap();
     let most = largest(&asset, |oracle, _, taps| {

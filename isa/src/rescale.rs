@@ -199,8 +199,8 @@ impl Requantizer {
             Requantizer::HalfEven => Rounding::HalfEven.shift(product, shift),
             Requantizer::HalfAway => Rounding::HalfAway.shift(product, shift),
             Requantizer::Double => {
-                // The first rounding is to 2^-31 of the product, ties away from zero; the second
-                // is the final one, ties up. TOSA folds both into a single addition.
+                // The first rounding is to 2^-31 of the product, ties up; the second is the final
+                // one, ties away from zero. TOSA folds both into a single addition.
                 let first = if shift > 31 {
                     if value >= 0 {
                         1_i64 << 30

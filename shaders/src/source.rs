@@ -43,13 +43,7 @@ pub const STAGES: &[Stage] = &[
     stage!("wide", ["wide_multiply", "wide_saturate"]),
     stage!(
         "vector",
-        [
-            "write_input",
-            "write_lane",
-            "read_lane",
-            "save_vectors",
-            "restore_vectors"
-        ]
+        ["vector_start", "write_input", "write_lane", "read_lane"]
     ),
     stage!("round", ["rounding_shift", "rounding_shift_wide"]),
     stage!("rescale", ["requantizer_apply"]),

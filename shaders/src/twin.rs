@@ -16,8 +16,8 @@ const DISPATCH_MACS: u64 = 1 << 32;
 /// Texels of one dispatch at most: bounds what the host keeps beside the answer.
 const DISPATCH_TEXELS: u64 = 1 << 20;
 
-/// Bytes of taps of one dispatch at most.
-const DISPATCH_TAP_BYTES: u64 = 1 << 26;
+/// Bytes of vectors or of taps of one dispatch at most.
+const DISPATCH_BYTES: u64 = 1 << 26;
 
 /// Iterations of all loops of one invocation in one pass. llvmpipe ends a shader's loops, without
 /// a word, after 65,535 of them in all (Mesa, `LP_MAX_TGSI_LOOP_ITERATIONS`); half of that leaves
@@ -139,7 +139,7 @@ impl Twin {
         self.check_all(requests)?;
         let pipeline = self.taps_pipeline()?;
         let texel_words = u64::from(self.layout.words);
-        let room = DISPATCH_TAP_BYTES.min(self.gpu.max_binding_bytes());
+        let room = DISPATCH_BYTES.min(self.gpu.max_binding_bytes());
         let chunk = self.chunk().min(room / (4 * texel_words)).max(1);
         let mut taps = Vec::with_capacity(requests.len());
         for requests in requests.chunks(chunk as usize) {
@@ -149,8 +149,8 @@ impl Twin {
                 .gpu
                 .results(texels * u64::from(self.shape.channel_count()))?;
             let results = self.gpu.results(texels * texel_words)?;
-            let waiting = self.waiting(texels)?;
-            let own = [(1, &uploaded), (6, &codes), (7, &results), (9, &waiting)];
+            let vectors = self.vectors(texels)?;
+            let own = [(1, &uploaded), (6, &codes), (7, &results), (9, &vectors)];
             let passes = self.passes(&own);
             let read = self
                 .gpu
@@ -187,8 +187,8 @@ impl Twin {
             let end = texels.min(start + chunk);
             let uploaded = self.upload((start..end).map(&request))?;
             let results = self.gpu.results((end - start) * channels)?;
-            let waiting = self.waiting(end - start)?;
-            let passes = self.passes(&[(1, &uploaded), (6, &results), (9, &waiting)]);
+            let vectors = self.vectors(end - start)?;
+            let passes = self.passes(&[(1, &uploaded), (6, &results), (9, &vectors)]);
             let groups = workgroups(end - start);
             codes.extend(self.gpu.run(&self.decode, &passes, groups, &results)?);
             start = end;
@@ -204,7 +204,7 @@ impl Twin {
         let group = u64::from(WORKGROUP);
         (DISPATCH_MACS / self.macs)
             .min(DISPATCH_TEXELS)
-            .min(self.gpu.max_binding_bytes() / texel_bytes)
+            .min(self.gpu.max_binding_bytes().min(DISPATCH_BYTES) / texel_bytes)
             .min(u64::from(self.gpu.max_workgroups()) * group)
             .max(group)
     }
@@ -218,14 +218,10 @@ impl Twin {
             .upload("requests", &requests, wgpu::BufferUsages::STORAGE)
     }
 
-    /// Where the vectors of a dispatch wait between its passes.
-    fn waiting(&self, texels: u64) -> Result<wgpu::Buffer, TwinError> {
-        let elements = if self.parts.len() > 1 {
-            texels * u64::from(self.sizes.vector_elements())
-        } else {
-            1
-        };
-        self.gpu.results(4 * elements)
+    /// The vectors of a dispatch.
+    fn vectors(&self, texels: u64) -> Result<wgpu::Buffer, TwinError> {
+        self.gpu
+            .results(texels * 4 * u64::from(self.sizes.vector_elements()))
     }
 
     /// The bindings of every pass: the asset's, a dispatch's own, and the pass's part.

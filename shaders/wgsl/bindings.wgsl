@@ -84,5 +84,5 @@ struct Part {
 @group(0) @binding(6) var<storage, read_write> codes: array<i32>;
 // Binding 7 is in taps.wgsl.
 @group(0) @binding(8) var<uniform> part: Part;
-// Where the vectors wait between two dispatches: element after element, of each every texel's.
-@group(0) @binding(9) var<storage, read_write> waiting: array<vec4<u32>>;
+// See vector.wgsl: sixteen lanes an element, the lane in the lowest bits first.
+@group(0) @binding(9) var<storage, read_write> vectors: array<vec4<u32>>;

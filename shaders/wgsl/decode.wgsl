@@ -8,17 +8,13 @@ fn decode(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let request = requests[texel];
     tap_texel(texel);
+    vector_start(texel);
 
     if (part.first_layer == 0u) {
         embed(request);
-    } else {
-        restore_vectors(texel);
     }
     for (var index = part.first_layer; index < part.end_layer; index++) {
         run_layer(index, texel);
-    }
-    if (part.end_layer < header.layers_count) {
-        save_vectors(texel);
     }
 }
 

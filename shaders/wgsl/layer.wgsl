@@ -15,10 +15,10 @@ fn dot16(a: vec4<u32>, b: vec4<u32>) -> i32 {
 fn dense(layer: Layer, source: u32, row: u32) -> vec4<i32> {
     let at = layer.row + row;
     var sums = vec4<i32>(rows[at].bias, rows[at + 1u].bias, rows[at + 2u].bias, rows[at + 3u].bias);
-    let lanes = vector_start(source);
+    var lanes = vector_element(source, 0u);
     var weight = layer.weight + row * layer.steps;
     for (var step = 0u; step < layer.steps; step++) {
-        let values = vectors[lanes + step];
+        let values = vectors[lanes];
         sums += vec4<i32>(
             dot16(weights[weight], values),
             dot16(weights[weight + 1u], values),
@@ -26,6 +26,7 @@ fn dense(layer: Layer, source: u32, row: u32) -> vec4<i32> {
             dot16(weights[weight + 3u], values),
         );
         weight += 4u;
+        lanes += vector_texels;
     }
     return sums;
 }

@@ -246,7 +246,7 @@ fn print_timing(results: &Results) {
         let charges: Vec<String> = row
             .ledger
             .iter()
-            .filter(|charge| charge.cycles > 0)
+            .filter(|charge| 1000 * charge.cycles >= row.cycles)
             .map(|c| {
                 format!(
                     "{} {:.1} %",

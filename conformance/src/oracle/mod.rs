@@ -37,6 +37,9 @@ pub struct RealTaps {
 }
 
 /// The naive decoder of one asset.
+///
+/// Methods that take a `layer` want one of the asset's, from 0; those that take values want one per
+/// lane of the stage, as the asset's shapes say.
 #[derive(Clone, Debug)]
 pub struct Oracle<'a> {
     asset: &'a Asset,

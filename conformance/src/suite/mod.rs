@@ -4,6 +4,7 @@ pub mod container;
 pub mod position;
 pub mod refuse;
 pub mod rescale;
+mod subjects;
 pub mod texel;
 
 use crate::emit::VectorError;

@@ -9,12 +9,13 @@ mod random;
 mod spec;
 
 pub use random::Random;
-pub use spec::{Spec, SpecActivation, arbitrary_spec, grid};
+pub use spec::{Spec, SpecActivation, SpecScale, arbitrary_spec, grid};
 
 use crate::oracle::{embed, synthesizer};
 use ntmu_isa::activation::Activation;
 use ntmu_isa::asset::{Encoding, Map, Metadata, Parts};
 use ntmu_isa::layer::{Layer, Skip};
+use ntmu_isa::limits;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{OutputFormat, Shape};
 use ntmu_isa::{Asset, AssetError};
@@ -63,8 +64,37 @@ pub fn asset(spec: &Spec, seed: u64) -> Result<Asset, AssetError> {
     })
 }
 
-/// Refuses a shape that an asset may not have.
+/// Refuses what an asset may not have and what the making of one would stumble over.
 fn check(spec: &Spec) -> Result<(), AssetError> {
+    let (low, high) = limits::WEIGHT_BITS;
+    let most = i32::from(limits::MAX_LANES);
+    let layers = spec.hidden.len() as i32 + i32::from(spec.blocks) * i32::from(spec.block_span) + 1;
+    let ranges = [
+        (
+            "weight_bits",
+            i32::from(spec.weight_bits),
+            (i32::from(low), i32::from(high)),
+        ),
+        (
+            "block_span",
+            i32::from(spec.block_span),
+            (1, i32::from(limits::MAX_SKIP_SPAN)),
+        ),
+        ("layers", layers, (1, i32::from(limits::MAX_LAYERS))),
+    ];
+    let widths = spec
+        .hidden
+        .iter()
+        .map(|&width| ("hidden", i32::from(width), (1, most)));
+    for (name, found, (low, high)) in ranges.into_iter().chain(widths) {
+        if found < low || found > high {
+            return Err(AssetError::Field {
+                field: format!("spec.{name}"),
+                found: found.to_string(),
+                allowed: format!("{low}..={high}"),
+            });
+        }
+    }
     // `Asset::new` checks the shape first; grids that are left out make it stop right after.
     let parts = Parts {
         shape: spec.shape.clone(),
@@ -229,16 +259,17 @@ fn fit_output(spec: &Spec, layer: &mut Layer, sums: &[Vec<f64>], random: &mut Ra
     }
 }
 
-/// The multiplier nearest to a positive scale, or the power of two just below it.
+/// A multiplier near a positive scale, of the kind that the spec asks for.
 fn multiplier(spec: &Spec, scale: f64) -> Multiplier {
     // A finite positive normal: 52 bits of fraction below an implied one.
     let bits = scale.to_bits();
     let exponent = (bits >> 52) as i32 - 1023;
-    let significand = if spec.has_ties {
-        1 << 52
-    } else {
-        (bits & ((1 << 52) - 1)) | (1 << 52)
+    let (significand, width) = match spec.scale {
+        SpecScale::Arbitrary => ((bits & ((1 << 52) - 1)) | 1 << 52, 52),
+        SpecScale::PowerOfTwo => (1, 0),
+        // ⌊7/5 · 2^30⌋. Its lower half, 0x9999, is more than one half of 2^16.
+        SpecScale::BelowTies => (0x5999_9999, 30),
     };
     // Scales here lie between 2^−30 and 2^17, well within what a multiplier expresses.
-    Multiplier::nearest(significand, exponent - 52).unwrap_or(Multiplier::power_of_two(0))
+    Multiplier::nearest(significand, exponent - width).unwrap_or(Multiplier::power_of_two(0))
 }

@@ -21,6 +21,18 @@ pub enum SpecActivation {
     HardGelu,
 }
 
+/// The multipliers of a synthetic asset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpecScale {
+    /// Whatever fits best.
+    Arbitrary,
+    /// Powers of two, so that roundings often meet ties.
+    PowerOfTwo,
+    /// 7/5 times a power of two, rounded down: odd multiples of 5 land just below ties, and beyond
+    /// them where a narrow multiplier rounds the mantissa up.
+    BelowTies,
+}
+
 /// What a synthetic asset is to look like.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Spec {
@@ -38,8 +50,8 @@ pub struct Spec {
     pub block_span: u8,
     /// Of all hidden layers.
     pub activation: SpecActivation,
-    /// Scales are powers of two, so that roundings often meet ties; else they are arbitrary.
-    pub has_ties: bool,
+    /// Of all rescalings.
+    pub scale: SpecScale,
 }
 
 impl Spec {
@@ -64,7 +76,7 @@ impl Spec {
             blocks: 1,
             block_span: 2,
             activation: SpecActivation::Relu,
-            has_ties: false,
+            scale: SpecScale::Arbitrary,
         }
     }
 }
@@ -141,6 +153,10 @@ pub fn arbitrary_spec(seed: u64) -> Spec {
             2 => SpecActivation::Leaky(r.within(1, 7) as u8),
             _ => SpecActivation::HardGelu,
         },
-        has_ties: r.within(0, 1) == 0,
+        scale: r.choose(&[
+            SpecScale::Arbitrary,
+            SpecScale::PowerOfTwo,
+            SpecScale::BelowTies,
+        ]),
     }
 }

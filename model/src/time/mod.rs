@@ -2,7 +2,7 @@
 //!
 //! | module | answers |
 //! |---|---|
-//! | [`unit`], [`presets`] | which hardware |
+//! | [`unit`](mod@unit), [`presets`] | which hardware |
 //! | [`work`] | what a texel asks of it |
 //! | `cost` | how long each stage takes for one thing of its size |
 //! | `lookup`, `cache`, `memory` | when a texel's corners are there |
