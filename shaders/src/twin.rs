@@ -9,8 +9,8 @@ use ntmu_isa::Asset;
 use ntmu_isa::shape::Shape;
 use std::sync::OnceLock;
 
-/// Products of one dispatch. A device that shows pictures stops work that takes seconds; this many
-/// take a slow one less than one.
+/// Products of one dispatch at most, unless one workgroup has more: drivers of devices that show
+/// pictures stop work that takes seconds.
 const DISPATCH_MACS: u64 = 1 << 32;
 
 /// Texels of one dispatch at most: bounds what the host keeps beside the answer.

@@ -1,6 +1,5 @@
 //! Which texels make a batch.
 
-use crate::positions::Positions;
 use crate::random::Stream;
 use crate::sampler::Texel;
 
@@ -70,12 +69,6 @@ pub(crate) fn all_texels(sizes: &[(u32, u32)]) -> impl Iterator<Item = Texel> + 
             (0..width).map(move |x| Texel { x, y, mip: mip as u8, window: 0 })
         })
     })
-}
-
-/// The corners of a texel, as the sampler's tables give them.
-pub(crate) fn grid_cells(positions: &Positions, grid: usize) -> usize {
-    let (width, height) = positions.grid_sizes[grid];
-    width as usize * height as usize
 }
 
 #[cfg(test)]

@@ -21,6 +21,8 @@ mod batch;
 mod calibrate;
 mod checkpoint;
 mod config;
+mod crop;
+mod encoder;
 mod engine;
 mod error;
 mod evaluate;

@@ -21,6 +21,8 @@ pub(crate) struct Window {
     pub(crate) origin: [[u32; 2]; 2],
     /// Cells of each grid along x and y.
     pub(crate) size: [[u32; 2]; 2],
+    /// Cells after which each grid repeats along x and y.
+    pub(crate) period: [[u32; 2]; 2],
     /// Where its cells start in each buffer.
     pub(crate) base: [usize; 2],
 }
@@ -31,6 +33,7 @@ impl Window {
         Window {
             origin: [[0; 2]; 2],
             size: positions.grid_sizes.map(|(w, h)| [w, h]),
+            period: positions.grid_sizes.map(|(w, h)| [w, h]),
             base: [0; 2],
         }
     }
@@ -81,7 +84,7 @@ impl Embedding {
         let window = &windows[usize::from(texel.window)];
         let mut out = [[0; 4]; 2];
         for g in 0..2 {
-            let (width, height) = positions.grid_sizes[g];
+            let [width, height] = window.period[g];
             let [ox, oy] = window.origin[g];
             let [w, h] = window.size[g];
             let xs = x.cells[g].map(|cell| local(cell, ox, w, width) as usize);

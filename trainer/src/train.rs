@@ -56,6 +56,9 @@ pub fn train(
         observer,
         stages: Vec::new(),
     };
+    if steps.encoder > 0 {
+        run.model.start_encoder(&run.ground);
+    }
     if let Some(path) = checkpoint.filter(|p| resume && p.exists()) {
         run.position = checkpoint::read(path, run.identity, &mut run.model)?;
     }
@@ -92,6 +95,9 @@ impl Run<'_> {
                 self.enter(stage);
             }
             self.stage(stage, &mut engine)?;
+            if stage == Stage::Encoder && self.steps.encoder > 0 {
+                self.model.encode_whole(&self.ground)?;
+            }
             if stage == Stage::Refine {
                 let errors = self.model.evaluate(&self.ground, Numbers::Real);
                 self.position.psnr_float = decibels(errors.overall());
@@ -128,7 +134,17 @@ impl Run<'_> {
                 });
             }
             let step = self.position.step;
-            let loss = self.model.step(&self.ground, engine, stage, step, self.rates(stage, step));
+            let rates = self.rates(stage, step);
+            let loss = match stage {
+                Stage::Encoder => {
+                    let factor = schedule::factor(step, steps);
+                    let rates = [factor * self.ground.config.encoder_rate, rates.synthesizer];
+                    self.model.encoder_step(&self.ground, engine, step, rates)?
+                }
+                Stage::Refine | Stage::Integer => {
+                    self.model.step(&self.ground, engine, stage, step, rates)
+                }
+            };
             if !loss.is_finite() {
                 return Err(TrainError::Diverged { stage: stage.name(), step, loss });
             }

@@ -1,0 +1,91 @@
+//! Every command of the README runs.
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+const README: &str = include_str!("../README.md");
+
+/// The commands in the README's table: what stands between backticks and is ours.
+fn commands() -> Vec<Vec<String>> {
+    README
+        .lines()
+        .filter(|line| line.starts_with('|'))
+        .flat_map(|line| line.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>())
+        .filter_map(|command| {
+            let ours = command.strip_prefix("ntmu ").map(str::to_owned);
+            ours.or_else(|| command.split_once(" -- ").map(|(_, rest)| rest.to_owned()))
+        })
+        .map(|command| command.split(' ').map(str::to_owned).collect())
+        .collect()
+}
+
+#[test]
+fn every_command_of_the_readme_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(path("wall.ntx"), ntmu::built_in::BYTES).unwrap();
+    let mut places = BTreeMap::from([
+        ("DIR", path("DIR")),
+        ("out.ntx", path("wall.ntx")),
+        ("IMAGES", path("IMAGES")),
+    ]);
+    run(&["generate".into(), "-o".into(), path("DIR")], folder.path());
+    let commands = commands();
+    assert!(commands.len() >= 10, "{commands:?}");
+    for mut command in commands {
+        let needs_adapter = command.contains(&"gpu".to_owned());
+        if command[0] == "encode" {
+            if !cfg!(feature = "train") {
+                support::skip("this build has no trainer");
+                continue;
+            }
+            // A small set of its own, so that the default effort takes seconds.
+            let small = ["generate", "-o", &path("small"), "--size", "64"].map(str::to_owned);
+            run(&small, folder.path());
+            places.insert("DIR", path("small"));
+            places.insert("out.ntx", path("small.ntx"));
+        } else {
+            places.insert("DIR", path("DIR"));
+            places.insert("out.ntx", path("wall.ntx"));
+        }
+        for word in &mut command {
+            if let Some(place) = places.get(word.as_str()) {
+                word.clone_from(place);
+            }
+        }
+        if needs_adapter && !has_adapter() {
+            support::skip("there is no wgpu adapter");
+            continue;
+        }
+        run(&command, folder.path());
+    }
+}
+
+fn run(arguments: &[String], folder: &Path) {
+    let binary = env!("CARGO_BIN_EXE_ntmu");
+    let output = Command::new(binary).args(arguments).current_dir(folder).output().unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
+}
+
+#[cfg(feature = "gpu")]
+fn has_adapter() -> bool {
+    ntmu::shaders::Gpu::open().is_ok()
+}
+
+#[cfg(not(feature = "gpu"))]
+fn has_adapter() -> bool {
+    false
+}
+
+#[test]
+fn every_file_that_the_readme_links_is_there() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let links = README.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    for link in links.filter(|link| !link.starts_with("http")) {
+        assert!(root.join(link).is_file(), "{link}");
+    }
+}
