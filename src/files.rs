@@ -24,11 +24,7 @@ pub(crate) fn read_asset(path: &Path) -> anyhow::Result<Asset> {
 /// Writes a file so that it is there whole or not at all.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     let found = || format!("cannot write {}", path.display());
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut beside = tempfile::NamedTempFile::new_in(folder).with_context(found)?;
+    let mut beside = ntmu::beside::file_for(path).with_context(found)?;
     beside.write_all(bytes).with_context(found)?;
     beside.as_file().sync_all().with_context(found)?;
     beside.persist(path).with_context(found)?;

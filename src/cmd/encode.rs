@@ -1,6 +1,5 @@
 //! `ntmu encode`: an asset from a texture set.
 
-use crate::Verdict;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -48,7 +47,7 @@ pub(crate) struct Encode {
 
 #[cfg(not(feature = "train"))]
 impl Encode {
-    pub(crate) fn run(self, _json: bool) -> anyhow::Result<Verdict> {
+    pub(crate) fn run(self, _json: bool) -> anyhow::Result<crate::Verdict> {
         let Encode {
             source,
             built_in,

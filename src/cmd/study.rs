@@ -203,11 +203,22 @@ fn print(results: &Results) {
     }
 }
 
+/// Differences up to this one have a row of their own; study.json has them all.
+const SHOWN_DIFFERENCE: u64 = 8;
+
 fn print_oracle(results: &Results) {
     let oracle = &results.oracle;
     let mut table = console::table(&["model − oracle, LSB", "codes"]);
-    for (difference, count) in &oracle.histogram {
+    let (shown, beyond): (Vec<_>, Vec<_>) = oracle
+        .histogram
+        .iter()
+        .partition(|(difference, _)| difference.unsigned_abs() <= SHOWN_DIFFERENCE);
+    for (difference, count) in shown {
         table.add_row([format!("{difference:+}"), count.to_string()]);
+    }
+    if !beyond.is_empty() {
+        let count: u64 = beyond.iter().map(|(_, count)| count).sum();
+        table.add_row([format!("beyond ±{SHOWN_DIFFERENCE}"), count.to_string()]);
     }
     console::print(&table.to_string());
     console::print(&format!(

@@ -9,6 +9,7 @@ use ndarray::ArrayView3;
 use tempfile::NamedTempFile;
 
 use super::exr_file;
+use crate::beside;
 
 /// Depth of the codes written, which decides the file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -137,7 +138,7 @@ pub fn write_map(
         path: path.to_owned(),
         found,
     };
-    let mut file = beside(path).map_err(|e| failed(e.to_string()))?;
+    let mut file = beside::file_for(path).map_err(|e| failed(e.to_string()))?;
     match depth {
         Depth::Eight => {
             let codes: Vec<u8> = interleaved(values)
@@ -202,19 +203,6 @@ fn write_png(
         .write_image(codes, width, height, color)
         .map_err(|e| e.to_string())?;
     out.flush().map_err(|e| e.to_string())
-}
-
-fn beside(path: &Path) -> std::io::Result<NamedTempFile> {
-    let folder = path
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".ntmu-").suffix(".part");
-    // Temporary files are private by default; this one becomes an ordinary file, under the umask.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
 }
 
 #[cfg(test)]

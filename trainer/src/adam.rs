@@ -32,7 +32,10 @@ impl Rate {
         let count = i32::try_from(count).unwrap_or(i32::MAX);
         let first = 1.0 - f64::from(BETA1).powi(count);
         let second = 1.0 - f64::from(BETA2).powi(count);
-        Rate { step: (learning_rate / first) as f32, root: (1.0 / second.sqrt()) as f32 }
+        Rate {
+            step: (learning_rate / first) as f32,
+            root: (1.0 / second.sqrt()) as f32,
+        }
     }
 
     /// One element: the moments advance, and what to subtract from the parameter comes back.
@@ -46,12 +49,20 @@ impl Rate {
 
 impl Moments {
     pub(crate) fn zero(len: usize) -> Moments {
-        Moments { first: vec![0.0; len], second: vec![0.0; len] }
+        Moments {
+            first: vec![0.0; len],
+            second: vec![0.0; len],
+        }
     }
 
     /// One update of `parameters` along `gradient`.
     pub(crate) fn update(&mut self, rate: Rate, parameters: &mut [f32], gradient: &[f32]) {
-        vectorised(Update { rate, parameters, gradient, moments: self });
+        vectorised(Update {
+            rate,
+            parameters,
+            gradient,
+            moments: self,
+        });
     }
 }
 

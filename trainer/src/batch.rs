@@ -16,20 +16,29 @@ pub(crate) fn draw_mip(choice: f64, u: f64, mip_count: u8, uniform: f64) -> u8 {
     }
     // 1 − u is in 0..=1 without the 0 whose logarithm is infinite.
     let mip = -(1.0 - u).ln() / 4.0_f64.ln();
-    if mip >= f64::from(last) { last } else { mip as u8 }
+    if mip >= f64::from(last) {
+        last
+    } else {
+        mip as u8
+    }
 }
 
 /// Texel `index` of a batch of the whole set.
-pub(crate) fn draw_texel(
-    stream: Stream,
-    index: u64,
-    sizes: &[(u32, u32)],
-    uniform: f64,
-) -> Texel {
+pub(crate) fn draw_texel(stream: Stream, index: u64, sizes: &[(u32, u32)], uniform: f64) -> Texel {
     let at = 4 * index;
-    let mip = draw_mip(stream.unit(at), stream.unit(at + 1), sizes.len() as u8, uniform);
+    let mip = draw_mip(
+        stream.unit(at),
+        stream.unit(at + 1),
+        sizes.len() as u8,
+        uniform,
+    );
     let (width, height) = sizes[usize::from(mip)];
-    Texel { x: stream.below(at + 2, width), y: stream.below(at + 3, height), mip, window: 0 }
+    Texel {
+        x: stream.below(at + 2, width),
+        y: stream.below(at + 3, height),
+        mip,
+        window: 0,
+    }
 }
 
 /// The buffers of one step, texel by texel.
@@ -47,7 +56,15 @@ pub(crate) struct Batch {
 impl Batch {
     pub(crate) fn new(len: usize, inputs: usize) -> Batch {
         Batch {
-            texels: vec![Texel { x: 0, y: 0, mip: 0, window: 0 }; len],
+            texels: vec![
+                Texel {
+                    x: 0,
+                    y: 0,
+                    mip: 0,
+                    window: 0
+                };
+                len
+            ],
             corners: [vec![[0; 4]; len], vec![[0; 4]; len]],
             weights: vec![[0.0; 4]; len],
             gradient: vec![0.0; len * inputs],
@@ -64,11 +81,19 @@ impl Batch {
 
 /// Every texel of every mip, mip by mip in reading order.
 pub(crate) fn all_texels(sizes: &[(u32, u32)]) -> impl Iterator<Item = Texel> + '_ {
-    sizes.iter().enumerate().flat_map(|(mip, &(width, height))| {
-        (0..height).flat_map(move |y| {
-            (0..width).map(move |x| Texel { x, y, mip: mip as u8, window: 0 })
+    sizes
+        .iter()
+        .enumerate()
+        .flat_map(|(mip, &(width, height))| {
+            (0..height).flat_map(move |y| {
+                (0..width).map(move |x| Texel {
+                    x,
+                    y,
+                    mip: mip as u8,
+                    window: 0,
+                })
+            })
         })
-    })
 }
 
 #[cfg(test)]
@@ -82,7 +107,12 @@ mod tests {
         let (mips, uniform, n) = (6_u8, 0.1, 400_000_u64);
         let mut counts = [0_u64; 6];
         for i in 0..n {
-            counts[usize::from(draw_mip(stream.unit(2 * i), stream.unit(2 * i + 1), mips, uniform))] += 1;
+            counts[usize::from(draw_mip(
+                stream.unit(2 * i),
+                stream.unit(2 * i + 1),
+                mips,
+                uniform,
+            ))] += 1;
         }
         for m in 0..6_u8 {
             // P(⌊−log4 u⌋ = m) = 4^−m − 4^−(m+1); the last mip takes the tail.
@@ -92,7 +122,10 @@ mod tests {
             let deviation = (n as f64 * p * (1.0 - p)).sqrt();
             let expected = n as f64 * p;
             let found = counts[usize::from(m)] as f64;
-            assert!((found - expected).abs() < 6.0 * deviation, "mip {m}: {found}, not {expected}");
+            assert!(
+                (found - expected).abs() < 6.0 * deviation,
+                "mip {m}: {found}, not {expected}"
+            );
         }
     }
 

@@ -24,7 +24,11 @@ pub(crate) fn calibrate(topology: &Topology, view: View<'_>, texels: &[Texel]) -
         forward(view, &mut workspace, tile);
         for (index, out) in outputs.iter_mut().enumerate() {
             let shape = topology.layers[index];
-            for row in workspace.layer_output(index).chunks_exact(shape.columns()).take(tile.len()) {
+            for row in workspace
+                .layer_output(index)
+                .chunks_exact(shape.columns())
+                .take(tile.len())
+            {
                 out.extend_from_slice(&row[..shape.outputs]);
             }
         }
@@ -35,7 +39,12 @@ pub(crate) fn calibrate(topology: &Topology, view: View<'_>, texels: &[Texel]) -
 /// One tile forward, without targets.
 pub(crate) fn forward(view: View<'_>, workspace: &mut Workspace, texels: &[Texel]) {
     let width = workspace.inputs.len() / TILE;
-    vectorised(GatherTile { view, texels, inputs: &mut workspace.inputs, width });
+    vectorised(GatherTile {
+        view,
+        texels,
+        inputs: &mut workspace.inputs,
+        width,
+    });
     workspace.forward(view.network);
 }
 
@@ -68,7 +77,10 @@ fn best_range(values: &[f32]) -> Range {
 fn range_between(low: f32, high: f32) -> Range {
     let scale = ((high - low) / 255.0).max(LEAST);
     let zero_point = (-128.0 - low / scale).round().clamp(-128.0, 127.0);
-    Range { scale, zero_point: zero_point as i16 }
+    Range {
+        scale,
+        zero_point: zero_point as i16,
+    }
 }
 
 #[cfg(test)]

@@ -53,7 +53,11 @@ fn arrays(model: &mut Model) -> Vec<&mut Vec<f32>> {
         &mut model.encoder_moments.second,
     ];
     for grid in [g0, g1] {
-        out.extend([&mut grid.values, &mut grid.moments.first, &mut grid.moments.second]);
+        out.extend([
+            &mut grid.values,
+            &mut grid.moments.first,
+            &mut grid.moments.second,
+        ]);
     }
     out
 }
@@ -78,8 +82,11 @@ pub(crate) fn write(
     bytes.push(position.stage as u8);
     bytes.extend(position.step.to_le_bytes());
     bytes.extend(position.psnr_float.to_le_bytes());
-    let ranges: Vec<f32> =
-        model.ranges.iter().flat_map(|r| [r.scale, f32::from(r.zero_point)]).collect();
+    let ranges: Vec<f32> = model
+        .ranges
+        .iter()
+        .flat_map(|r| [r.scale, f32::from(r.zero_point)])
+        .collect();
     let arrays = arrays(&mut model);
     bytes.extend((arrays.len() as u32 + 1).to_le_bytes());
     for array in arrays {
@@ -87,7 +94,10 @@ pub(crate) fn write(
     }
     put_array(&mut bytes, &ranges);
     bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
-    let io = |cause| TrainError::Io { path: path.to_owned(), cause };
+    let io = |cause| TrainError::Io {
+        path: path.to_owned(),
+        cause,
+    };
     let mut beside = path.as_os_str().to_owned();
     beside.push(".part");
     let beside = PathBuf::from(beside);
@@ -145,7 +155,10 @@ impl<'a> Reader<'a> {
 
 /// Reads the state from `path` into `model`, which is a fresh one of the same run.
 pub(crate) fn read(path: &Path, identity: u64, model: &mut Model) -> Result<Position, TrainError> {
-    let file = std::fs::read(path).map_err(|cause| TrainError::Io { path: path.to_owned(), cause })?;
+    let file = std::fs::read(path).map_err(|cause| TrainError::Io {
+        path: path.to_owned(),
+        cause,
+    })?;
     let mut reader = Reader { path, bytes: &file };
     if reader.bytes.len() < MAGIC.len() + 4 || &reader.array()? != MAGIC {
         return Err(reader.refuse("another kind of file", "a checkpoint of this trainer"));
@@ -176,14 +189,24 @@ pub(crate) fn read(path: &Path, identity: u64, model: &mut Model) -> Result<Posi
     for target in targets {
         let values = reader.floats()?;
         if values.len() != target.len() {
-            return Err(reader.refuse(format!("an array of {}", values.len()), format!("{}", target.len())));
+            return Err(reader.refuse(
+                format!("an array of {}", values.len()),
+                format!("{}", target.len()),
+            ));
         }
         *target = values;
     }
     let ranges = reader.floats()?;
     model.ranges = ranges
         .chunks_exact(2)
-        .map(|pair| Range { scale: pair[0], zero_point: pair[1] as i16 })
+        .map(|pair| Range {
+            scale: pair[0],
+            zero_point: pair[1] as i16,
+        })
         .collect();
-    Ok(Position { stage, step, psnr_float })
+    Ok(Position {
+        stage,
+        step,
+        psnr_float,
+    })
 }

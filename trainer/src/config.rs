@@ -170,21 +170,36 @@ impl TrainConfig {
     pub fn validate(&self) -> Result<(), TrainError> {
         for (index, grid) in self.grids.iter().enumerate() {
             let field = |name: &str| format!("grids[{index}].{name}");
-            range(field("channels"), grid.channels, 1, limits::MAX_GRID_CHANNELS)?;
+            range(
+                field("channels"),
+                grid.channels,
+                1,
+                limits::MAX_GRID_CHANNELS,
+            )?;
             let (low, high) = limits::LATENT_BITS;
             range(field("bits"), grid.bits, low, high)?;
             let (low, high) = limits::GRID_SCALE_LOG2;
             range(field("scale_log2"), grid.scale_log2, low, high)?;
         }
         range("octaves", self.octaves, 0, MAX_OCTAVES)?;
-        range("inputs", self.input_count(), 1, usize::from(limits::MAX_LANES))?;
+        range(
+            "inputs",
+            self.input_count(),
+            1,
+            usize::from(limits::MAX_LANES),
+        )?;
         if self.hidden.is_empty() {
             return Err(TrainError::config("hidden", "no layer", "at least one"));
         }
         for (index, &width) in self.hidden.iter().enumerate() {
             range(format!("hidden[{index}]"), width, 1, limits::MAX_LANES)?;
         }
-        range("layers_per_block", self.layers_per_block, 1, limits::MAX_SKIP_SPAN)?;
+        range(
+            "layers_per_block",
+            self.layers_per_block,
+            1,
+            limits::MAX_SKIP_SPAN,
+        )?;
         let blocks = usize::from(self.residual_blocks) * usize::from(self.layers_per_block);
         let layers = self.hidden.len() + blocks + 1;
         range("layers", layers, 2, usize::from(limits::MAX_LAYERS))?;
@@ -218,11 +233,18 @@ impl TrainConfig {
 
     /// The shape of grid `grid`; the configuration is valid.
     pub(crate) fn grid_shape(&self, grid: usize) -> Result<GridShape, TrainError> {
-        let GridConfig { channels, bits, scale_log2 } = self.grids[grid];
-        let format = LatentFormat::new(bits).ok_or_else(|| {
-            TrainError::config(format!("grids[{grid}].bits"), bits, "1..=8")
-        })?;
-        Ok(GridShape { channels, format, scale_log2 })
+        let GridConfig {
+            channels,
+            bits,
+            scale_log2,
+        } = self.grids[grid];
+        let format = LatentFormat::new(bits)
+            .ok_or_else(|| TrainError::config(format!("grids[{grid}].bits"), bits, "1..=8"))?;
+        Ok(GridShape {
+            channels,
+            format,
+            scale_log2,
+        })
     }
 }
 
@@ -244,6 +266,10 @@ fn multiple(field: &str, found: u32, of: u32) -> Result<(), TrainError> {
     if found.is_multiple_of(of) {
         Ok(())
     } else {
-        Err(TrainError::config(field, found, format!("a multiple of {of}")))
+        Err(TrainError::config(
+            field,
+            found,
+            format!("a multiple of {of}"),
+        ))
     }
 }

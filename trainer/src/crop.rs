@@ -42,7 +42,11 @@ impl Crops {
         let wraps = AddressMode::from(config.address) == AddressMode::Wrap;
         let origin = |index: u64, axis: usize| {
             let free = all[axis] - size[axis];
-            let choices = if free > 0 && wraps { all[axis] } else { free + 1 };
+            let choices = if free > 0 && wraps {
+                all[axis]
+            } else {
+                free + 1
+            };
             stream.below(2 * index + axis as u64, choices)
         };
         // Crops that are the whole set would all be the same.
@@ -53,19 +57,27 @@ impl Crops {
     }
 
     fn shape(&self) -> (usize, usize, usize) {
-        (self.origins.len(), self.size[1] as usize, self.size[0] as usize)
+        (
+            self.origins.len(),
+            self.size[1] as usize,
+            self.size[0] as usize,
+        )
     }
 
     fn windows(&self, ground: &Ground<'_>) -> Vec<Window> {
         let scale = |g: usize| SCALE_LOG2 - ground.config.grids[g].scale_log2;
         let cells = |of: [u32; 2]| [0, 1].map(|g: usize| of.map(|n| n << scale(g)));
         let size = cells(self.size);
-        let windows = self.origins.iter().enumerate().map(|(item, &origin)| Window {
-            origin: cells(origin),
-            size,
-            period: cells(self.all),
-            base: size.map(|[w, h]| item * w as usize * h as usize),
-        });
+        let windows = self
+            .origins
+            .iter()
+            .enumerate()
+            .map(|(item, &origin)| Window {
+                origin: cells(origin),
+                size,
+                period: cells(self.all),
+                base: size.map(|[w, h]| item * w as usize * h as usize),
+            });
         windows.collect()
     }
 
@@ -83,13 +95,26 @@ impl Crops {
         };
         let mip = crate::batch::draw_mip(stream.unit(at), stream.unit(at + 1), deepest, uniform);
         let place = |axis: usize, texels: u32| {
-            let inside = stream.below(at + 2 + axis as u64, (self.size[axis] * POSITION >> mip).max(1));
-            let place = (self.origins[window][axis] * POSITION >> mip) + inside;
-            let around = (self.all[axis] * POSITION >> mip).max(1);
-            (if place >= around { place - around } else { place }).min(texels - 1)
+            let inside = stream.below(
+                at + 2 + axis as u64,
+                ((self.size[axis] * POSITION) >> mip).max(1),
+            );
+            let place = ((self.origins[window][axis] * POSITION) >> mip) + inside;
+            let around = ((self.all[axis] * POSITION) >> mip).max(1);
+            (if place >= around {
+                place - around
+            } else {
+                place
+            })
+            .min(texels - 1)
         };
         let (width, height) = sizes[usize::from(mip)];
-        Texel { x: place(0, width), y: place(1, height), mip, window: window as u16 }
+        Texel {
+            x: place(0, width),
+            y: place(1, height),
+            mip,
+            window: window as u16,
+        }
     }
 }
 
@@ -98,11 +123,17 @@ impl Crops {
 fn image(ground: &Ground<'_>, first: [i32; 2], size: [usize; 2], out: &mut Vec<f32>) {
     let (width, height) = ground.texels.sizes[0];
     let mode = AddressMode::from(ground.config.address);
-    let columns: Vec<u32> = (0..size[0] as i32).map(|i| mode.resolve(first[0] + i, width)).collect();
+    let columns: Vec<u32> = (0..size[0] as i32)
+        .map(|i| mode.resolve(first[0] + i, width))
+        .collect();
     for channel in 0..ground.texels.channels {
         for row in 0..size[1] as i32 {
             let y = mode.resolve(first[1] + row, height);
-            out.extend(columns.iter().map(|&x| ground.texels.texel(x, y, 0)[channel]));
+            out.extend(
+                columns
+                    .iter()
+                    .map(|&x| ground.texels.texel(x, y, 0)[channel]),
+            );
         }
     }
 }
@@ -131,7 +162,12 @@ impl Model {
         let mut images = Vec::with_capacity(items * ground.texels.channels * size[0] * size[1]);
         for origin in &crops.origins {
             // A crop that wraps leaves the padded set on one side and enters it on the other.
-            image(ground, origin.map(|n| (n * POSITION) as i32), size, &mut images);
+            image(
+                ground,
+                origin.map(|n| (n * POSITION) as i32),
+                size,
+                &mut images,
+            );
         }
         let shape = [items, ground.texels.channels, size[1], size[0]];
         let pass = encoder.forward(&self.encoder, images, shape, true);
@@ -143,10 +179,15 @@ impl Model {
             let (low, high) = (format.min_value() as f32, format.max_value() as f32);
             let mut seen = vec![0.0; grids[g].len()];
             let channels = usize::from(config.grids[g].channels);
-            for_latents((items, rows, columns), channels, config.grids[g].scale_log2, |from, to| {
-                let noise = half_unit_noise(noise.wrapping_add(g as u32), to as u32);
-                seen[to] = (grids[g][from] * codes).clamp(low, high) + noise;
-            });
+            for_latents(
+                (items, rows, columns),
+                channels,
+                config.grids[g].scale_log2,
+                |from, to| {
+                    let noise = half_unit_noise(noise.wrapping_add(g as u32), to as u32);
+                    seen[to] = (grids[g][from] * codes).clamp(low, high) + noise;
+                },
+            );
             seen
         });
         let stream = Stream::new(config.seed, Purpose::Batch, step);
@@ -171,18 +212,26 @@ impl Model {
         let of_tensors = [0, 1].map(|g: usize| {
             let mut out = vec![0.0; gradients[g].len()];
             let channels = usize::from(config.grids[g].channels);
-            for_latents((items, rows, columns), channels, config.grids[g].scale_log2, |from, to| {
-                // Beyond the range only a gradient that leads back counts.
-                let (real, gradient) = (grids[g][from], gradients[g][to]);
-                let outward = (real > 0.5 && gradient < 0.0) || (real < -0.5 && gradient > 0.0);
-                out[from] = if outward { 0.0 } else { gradient };
-            });
+            for_latents(
+                (items, rows, columns),
+                channels,
+                config.grids[g].scale_log2,
+                |from, to| {
+                    // Beyond the range only a gradient that leads back counts.
+                    let (real, gradient) = (grids[g][from], gradients[g][to]);
+                    let outward = (real > 0.5 && gradient < 0.0) || (real < -0.5 && gradient > 0.0);
+                    out[from] = if outward { 0.0 } else { gradient };
+                },
+            );
             out
         });
+        ground.hold_constants(&mut engine.parameters);
         let gradient = encoder.backward(pass, of_tensors)?;
         let [of_encoder, of_synthesizer] = rates.map(|rate| Rate::new(rate, step + 1));
-        self.encoder_moments.update(of_encoder, &mut self.encoder, &gradient);
-        self.moments.update(of_synthesizer, &mut self.parameters, &engine.parameters);
+        self.encoder_moments
+            .update(of_encoder, &mut self.encoder, &gradient);
+        self.moments
+            .update(of_synthesizer, &mut self.parameters, &engine.parameters);
         Ok(loss)
     }
 
@@ -202,33 +251,43 @@ impl Model {
                 let mut images = Vec::new();
                 image(ground, first, padded, &mut images);
                 let shape = [1, ground.texels.channels, padded[1], padded[0]];
-                let grids = encoder.forward(&self.encoder, images, shape, false).grids()?;
-                for g in 0..2 {
+                let grids = encoder
+                    .forward(&self.encoder, images, shape, false)
+                    .grids()?;
+                for (g, grid) in grids.iter().enumerate() {
                     let scale_log2 = config.grids[g].scale_log2;
                     let side = 1_usize << (SCALE_LOG2 - scale_log2);
                     let channels = usize::from(config.grids[g].channels);
                     let (cells_x, cells_y) = ground.positions.grid_sizes[g];
                     let latents = &mut self.latents[g];
                     let codes = (1_u32 << latents.format.bits()) as f32;
-                    let (low, high) =
-                        (latents.format.min_value() as f32, latents.format.max_value() as f32);
+                    let (low, high) = (
+                        latents.format.min_value() as f32,
+                        latents.format.max_value() as f32,
+                    );
                     let around = [padded[1], padded[0]].map(|n| n / POSITION as usize);
                     let row_cells = around[1] * side;
-                    for_latents((1, around[0], around[1]), channels, scale_log2, |from, to| {
-                        let (cell, channel) = (to / channels, to % channels);
-                        let (y, x) = (cell / row_cells, cell % row_cells);
-                        let skip = margin as usize * side;
-                        let inside = |at: usize, n: u32| at >= skip && at < skip + n as usize * side;
-                        if !inside(x, size[0]) || !inside(y, size[1]) {
-                            return;
-                        }
-                        let x = x - skip + left as usize * side;
-                        let y = y - skip + top as usize * side;
-                        if x < cells_x as usize && y < cells_y as usize {
-                            let at = (y * cells_x as usize + x) * channels + channel;
-                            latents.values[at] = (grids[g][from] * codes).clamp(low, high);
-                        }
-                    });
+                    for_latents(
+                        (1, around[0], around[1]),
+                        channels,
+                        scale_log2,
+                        |from, to| {
+                            let (cell, channel) = (to / channels, to % channels);
+                            let (y, x) = (cell / row_cells, cell % row_cells);
+                            let skip = margin as usize * side;
+                            let inside =
+                                |at: usize, n: u32| at >= skip && at < skip + n as usize * side;
+                            if !inside(x, size[0]) || !inside(y, size[1]) {
+                                return;
+                            }
+                            let x = x - skip + left as usize * side;
+                            let y = y - skip + top as usize * side;
+                            if x < cells_x as usize && y < cells_y as usize {
+                                let at = (y * cells_x as usize + x) * channels + channel;
+                                latents.values[at] = (grid[from] * codes).clamp(low, high);
+                            }
+                        },
+                    );
                 }
             }
         }

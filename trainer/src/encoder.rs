@@ -49,8 +49,11 @@ pub(crate) struct Pass {
 }
 
 fn values<const D: usize>(tensor: Tensor<D>) -> Result<Vec<f32>, TrainError> {
-    let data = tensor.try_into_data().map_err(|e| TrainError::Engine(format!("{e:?}")))?;
-    data.into_vec().map_err(|e| TrainError::Engine(format!("{e:?}")))
+    let data = tensor
+        .try_into_data()
+        .map_err(|e| TrainError::Engine(format!("{e:?}")))?;
+    data.try_into_vec()
+        .map_err(|e| TrainError::Engine(format!("{e:?}")))
 }
 
 impl Encoder {
@@ -58,7 +61,10 @@ impl Encoder {
         let width = usize::from(config.encoder_width);
         // ELIC's bottleneck has 320 channels at width 192.
         let bottleneck = width * 5 / 3;
-        let mut encoder = Encoder { convs: Vec::new(), parameters: 0 };
+        let mut encoder = Encoder {
+            convs: Vec::new(),
+            parameters: 0,
+        };
         for inputs in [channels, width] {
             encoder.push(inputs, width, 5, 2);
             for _ in 0..BLOCKS {
@@ -79,7 +85,14 @@ impl Encoder {
         let weights_at = self.parameters;
         let bias_at = weights_at + outputs * inputs * kernel * kernel;
         self.parameters = bias_at + outputs;
-        self.convs.push(Conv { inputs, outputs, kernel, stride, weights_at, bias_at });
+        self.convs.push(Conv {
+            inputs,
+            outputs,
+            kernel,
+            stride,
+            weights_at,
+            bias_at,
+        });
     }
 
     /// Initial parameters: uniform after He et al. 2015, biases zero, and the last convolution of
@@ -88,11 +101,14 @@ impl Encoder {
         let mut parameters = vec![0.0; self.parameters];
         for (index, conv) in self.convs.iter().enumerate() {
             let fan_in = (conv.inputs * conv.kernel * conv.kernel) as f32;
-            let ends_block = index % (1 + 3 * BLOCKS) != 0 && index % (1 + 3 * BLOCKS) % 3 == 0;
-            let damp = if ends_block && index < 2 * (1 + 3 * BLOCKS) { 0.1 } else { 1.0 };
+            // Within a stage: the halving, then three convolutions for each block.
+            let (stage, place) = (index / (1 + 3 * BLOCKS), index % (1 + 3 * BLOCKS));
+            let ends_block = stage < 2 && place > 0 && place.is_multiple_of(3);
+            let damp = if ends_block { 0.1 } else { 1.0 };
             let bound = damp * (6.0 / fan_in).sqrt();
-            for at in conv.weights_at..conv.bias_at {
-                parameters[at] = bound * stream.signed(at as u64);
+            let weights = &mut parameters[conv.weights_at..conv.bias_at];
+            for (at, weight) in (conv.weights_at..).zip(weights) {
+                *weight = bound * stream.signed(at as u64);
             }
         }
         parameters
@@ -107,7 +123,11 @@ impl Encoder {
         shape: [usize; 4],
         tracked: bool,
     ) -> Pass {
-        let device = if tracked { Device::flex().autodiff() } else { Device::flex() };
+        let device = if tracked {
+            Device::flex().autodiff()
+        } else {
+            Device::flex()
+        };
         let parameters: Vec<(Tensor<4>, Tensor<1>)> = self
             .convs
             .iter()
@@ -117,7 +137,11 @@ impl Encoder {
                 let sides = [c.outputs, c.inputs, c.kernel, c.kernel];
                 let w = Tensor::<4>::from_data(TensorData::new(weights, sides), &device);
                 let b = Tensor::<1>::from_data(TensorData::new(bias, [c.outputs]), &device);
-                if tracked { (w.require_grad(), b.require_grad()) } else { (w, b) }
+                if tracked {
+                    (w.require_grad(), b.require_grad())
+                } else {
+                    (w, b)
+                }
             })
             .collect();
         let images = Tensor::<4>::from_data(TensorData::new(images, shape), &device);
@@ -143,12 +167,22 @@ impl Encoder {
         let bottleneck = 2 * (1 + 3 * BLOCKS);
         let z = apply(x, bottleneck).tanh() * 0.5;
         let outputs = [apply(z.clone(), bottleneck + 1), apply(z, bottleneck + 2)];
-        Pass { parameters, outputs }
+        Pass {
+            parameters,
+            outputs,
+        }
     }
 
     /// The gradient of the parameters, given that of both grids in the layout of [`Pass::grids`].
-    pub(crate) fn backward(&self, pass: Pass, gradients: [Vec<f32>; 2]) -> Result<Vec<f32>, TrainError> {
-        let Pass { parameters, outputs } = pass;
+    pub(crate) fn backward(
+        &self,
+        pass: Pass,
+        gradients: [Vec<f32>; 2],
+    ) -> Result<Vec<f32>, TrainError> {
+        let Pass {
+            parameters,
+            outputs,
+        } = pass;
         let [g0, g1] = gradients;
         let [o0, o1] = outputs;
         // The scalar product with a constant has that constant as its gradient: what the
@@ -201,7 +235,10 @@ pub(crate) fn for_latents(
                     for column in 0..columns {
                         let x = column * side + sub % side;
                         let cell = (item * rows * side + y) * columns * side + x;
-                        each((plane * rows + row) * columns + column, cell * channels + channel);
+                        each(
+                            (plane * rows + row) * columns + column,
+                            cell * channels + channel,
+                        );
                     }
                 }
             }

@@ -63,16 +63,34 @@ impl Engine {
     /// Forward and backward over the batch's texels. Leaves the gradient of the mean squared
     /// error in `self.parameters` and, texel by texel, in the batch; returns that error.
     pub(crate) fn step(&mut self, view: View<'_>) -> f64 {
-        let Batch { texels, corners: [c0, c1], weights, gradient } = &mut self.batch;
+        let Batch {
+            texels,
+            corners: [c0, c1],
+            weights,
+            gradient,
+        } = &mut self.batch;
         let len = texels.len().div_ceil(CHUNKS);
         let scale = 1.0 / (texels.len() * view.texels.channels) as f32;
         self.chunks
             .par_iter_mut()
             .zip(texels.par_chunks(len))
             .zip(c0.par_chunks_mut(len).zip(c1.par_chunks_mut(len)))
-            .zip(weights.par_chunks_mut(len).zip(gradient.par_chunks_mut(len * self.inputs)))
+            .zip(
+                weights
+                    .par_chunks_mut(len)
+                    .zip(gradient.par_chunks_mut(len * self.inputs)),
+            )
             .for_each(|(((chunk, texels), (c0, c1)), (weights, gradient))| {
-                Pass { view, scale, chunk, texels, corners: [c0, c1], weights, gradient }.run();
+                Pass {
+                    view,
+                    scale,
+                    chunk,
+                    texels,
+                    corners: [c0, c1],
+                    weights,
+                    gradient,
+                }
+                .run();
             });
         let (first, rest) = self.chunks.split_at(1);
         let sums = first.iter().map(|c| &c.gradient);
@@ -90,8 +108,24 @@ impl Engine {
         let [g0, g1] = gradients;
         let batch = &self.batch;
         rayon::join(
-            || vectorised(Scatter { embedding, batch, inputs: self.inputs, grid: 0, gradient: g0 }),
-            || vectorised(Scatter { embedding, batch, inputs: self.inputs, grid: 1, gradient: g1 }),
+            || {
+                vectorised(Scatter {
+                    embedding,
+                    batch,
+                    inputs: self.inputs,
+                    grid: 0,
+                    gradient: g0,
+                })
+            },
+            || {
+                vectorised(Scatter {
+                    embedding,
+                    batch,
+                    inputs: self.inputs,
+                    grid: 1,
+                    gradient: g1,
+                })
+            },
         );
     }
 }
@@ -108,17 +142,39 @@ struct Pass<'a> {
 
 impl Pass<'_> {
     fn run(self) {
-        let Pass { view, scale, chunk, texels, corners: [c0, c1], weights, gradient } = self;
-        let Chunk { workspace, targets, gradient: sum, error } = chunk;
+        let Pass {
+            view,
+            scale,
+            chunk,
+            texels,
+            corners: [c0, c1],
+            weights,
+            gradient,
+        } = self;
+        let Chunk {
+            workspace,
+            targets,
+            gradient: sum,
+            error,
+        } = chunk;
         sum.fill(0.0);
         *error = 0.0;
         let channels = view.texels.channels;
         let width = workspace.inputs.len() / TILE;
         let tiles = texels.chunks(TILE).zip(gradient.chunks_mut(TILE * width));
-        let corners = c0.chunks_mut(TILE).zip(c1.chunks_mut(TILE)).zip(weights.chunks_mut(TILE));
+        let corners = c0
+            .chunks_mut(TILE)
+            .zip(c1.chunks_mut(TILE))
+            .zip(weights.chunks_mut(TILE));
         for ((texels, gradient), ((c0, c1), weights)) in tiles.zip(corners) {
-            vectorised(GatherTile { view, texels, inputs: &mut workspace.inputs, width });
-            for (i, (target, &texel)) in targets.chunks_exact_mut(channels).zip(texels).enumerate() {
+            vectorised(GatherTile {
+                view,
+                texels,
+                inputs: &mut workspace.inputs,
+                width,
+            });
+            for (i, (target, &texel)) in targets.chunks_exact_mut(channels).zip(texels).enumerate()
+            {
                 let (corners, lerp) = view.embedding.corners(view.positions, view.windows, texel);
                 c0[i] = corners[0].map(|at| at as u32);
                 c1[i] = corners[1].map(|at| at as u32);
@@ -144,9 +200,15 @@ pub(crate) struct GatherTile<'a> {
 impl Vectorised for GatherTile<'_> {
     #[inline(always)]
     fn run<const FUSED: bool>(self) {
-        let GatherTile { view, texels, inputs, width } = self;
+        let GatherTile {
+            view,
+            texels,
+            inputs,
+            width,
+        } = self;
         for (row, &texel) in inputs.chunks_exact_mut(width).zip(texels) {
-            view.embedding.gather(view.positions, view.windows, texel, view.seen, row);
+            view.embedding
+                .gather(view.positions, view.windows, texel, view.seen, row);
         }
     }
 }
@@ -162,8 +224,17 @@ struct Scatter<'a> {
 impl Vectorised for Scatter<'_> {
     #[inline(always)]
     fn run<const FUSED: bool>(self) {
-        let Scatter { embedding, batch, inputs, grid, gradient } = self;
-        let rows = batch.gradient.chunks_exact(inputs).zip(&batch.corners[grid]);
+        let Scatter {
+            embedding,
+            batch,
+            inputs,
+            grid,
+            gradient,
+        } = self;
+        let rows = batch
+            .gradient
+            .chunks_exact(inputs)
+            .zip(&batch.corners[grid]);
         if grid == 0 {
             let lanes = 4 * embedding.channels[0];
             for (row, corners) in rows {

@@ -34,9 +34,7 @@ pub enum TrainError {
         allowed: String,
     },
     /// The loss is no longer a number.
-    #[error(
-        "the loss is {loss} in stage {stage} at step {step}; a lower learning rate may help"
-    )]
+    #[error("the loss is {loss} in stage {stage} at step {step}; a lower learning rate may help")]
     Diverged {
         /// The stage.
         stage: &'static str,

@@ -73,13 +73,18 @@ pub(crate) fn evaluate(topology: &Topology, view: View<'_>) -> Errors {
     }
     Errors {
         sums: sums.chunks(channels).map(<[f64]>::to_vec).collect(),
-        counts: sizes.iter().map(|&(w, h)| u64::from(w) * u64::from(h)).collect(),
+        counts: sizes
+            .iter()
+            .map(|&(w, h)| u64::from(w) * u64::from(h))
+            .collect(),
     }
 }
 
 fn add_errors(view: View<'_>, workspace: &Workspace, tile: &[Texel], sums: &mut [f64]) {
     let channels = view.texels.channels;
-    let Some(last) = view.network.layers.last() else { return };
+    let Some(last) = view.network.layers.last() else {
+        return;
+    };
     let rows = workspace.output().chunks_exact(last.shape.columns());
     for (row, texel) in rows.zip(tile) {
         let target = view.texels.texel(texel.x, texel.y, texel.mip);

@@ -5,13 +5,13 @@ use crate::error::TrainError;
 use crate::integer::Range;
 use crate::network::{Epilogue, Network, Prepared, Rescaling};
 use crate::source::Source;
+use ntmu_isa::Asset;
 use ntmu_isa::activation::Activation;
 use ntmu_isa::asset::{Metadata, Parts};
 use ntmu_isa::layer::{Layer, Skip};
 use ntmu_isa::profile::Profile;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::Shape;
-use ntmu_isa::Asset;
 
 /// The sizes of a set's asset.
 pub(crate) fn shape_of(config: &TrainConfig, source: &Source) -> Result<Shape, TrainError> {
@@ -34,9 +34,8 @@ fn multiplier(scale: f64) -> Result<Multiplier, TrainError> {
     let bits = narrow.to_bits();
     let (exponent, fraction) = ((bits >> 23) as i32, u64::from(bits & 0x7f_ffff));
     // Every scale is positive and far from the subnormal floats.
-    Multiplier::nearest(fraction | 1 << 23, exponent - 150).map_err(|error| {
-        TrainError::config("scale", scale, error.to_string())
-    })
+    Multiplier::nearest(fraction | 1 << 23, exponent - 150)
+        .map_err(|error| TrainError::config("scale", scale, error.to_string()))
 }
 
 fn layer(
@@ -45,8 +44,17 @@ fn layer(
     range: Option<&Range>,
     input_zero: i32,
 ) -> Result<Layer, TrainError> {
-    let Prepared { shape, weights, bias, epilogue, .. } = &network.layers[index];
-    let Epilogue::Integer(Rescaling { scales, gate, skip, .. }) = epilogue else {
+    let Prepared {
+        shape,
+        weights,
+        bias,
+        epilogue,
+        ..
+    } = &network.layers[index];
+    let Epilogue::Integer(Rescaling {
+        scales, gate, skip, ..
+    }) = epilogue
+    else {
         return Err(TrainError::config("network", "reals", "integers"));
     };
     let columns = shape.columns();
@@ -64,10 +72,15 @@ fn layer(
         _ if !shape.activated => Activation::Identity,
         ActivationKind::Relu => Activation::Relu,
         ActivationKind::Leaky { shift } => Activation::Leaky { shift },
-        ActivationKind::HardGelu => Activation::HardGelu { scale: multiplier(*gate)? },
+        ActivationKind::HardGelu => Activation::HardGelu {
+            scale: multiplier(*gate)?,
+        },
     };
     let skip = match shape.skip {
-        Some(span) => Some(Skip { span: span as u8, scale: multiplier(*skip)? }),
+        Some(span) => Some(Skip {
+            span: span as u8,
+            scale: multiplier(*skip)?,
+        }),
         None => None,
     };
     Ok(Layer {
@@ -107,6 +120,10 @@ pub(crate) fn asset(
         grids,
         weight_bits: config.weight_bits,
         layers,
-        metadata: Metadata { name: source.name.clone(), maps: source.maps.clone(), record },
+        metadata: Metadata {
+            name: source.name.clone(),
+            maps: source.maps.clone(),
+            record,
+        },
     })?)
 }

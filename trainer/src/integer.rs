@@ -11,9 +11,9 @@
 //! Training computes with these very integers and passes gradients straight through every
 //! rounding; the export writes the same integers down.
 
+use crate::config::ActivationKind;
 use crate::network::{Epilogue, Network, Prepared, Rescaling, transpose};
 use crate::topology::Topology;
-use crate::config::ActivationKind;
 use ntmu_isa::activation::GATE_FRACTION_BITS;
 use ntmu_isa::embed::INPUT_FRACTION_BITS;
 use ntmu_isa::shape::OutputFormat;
@@ -80,11 +80,15 @@ pub(crate) fn quantise(
         for o in 0..shape.outputs {
             // A row of zeros, or one whose bias outweighs its weights, takes the coarser scale.
             let least = LEAST_SCALE / (f64::from(s_in) * target(o));
-            scale[o] = (greatest[o] / largest).max(bias[o].abs() / (s_in * BIAS_LIMIT)).max(least as f32);
+            scale[o] = (greatest[o] / largest)
+                .max(bias[o].abs() / (s_in * BIAS_LIMIT))
+                .max(least as f32);
             rescale[o] = f64::from((f64::from(scale[o]) * f64::from(s_in) * target(o)) as f32);
         }
-        let reciprocal: Vec<f32> =
-            scale.iter().map(|&s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect();
+        let reciprocal: Vec<f32> = scale
+            .iter()
+            .map(|&s| if s > 0.0 { 1.0 / s } else { 0.0 })
+            .collect();
         let mut weights = source.to_vec();
         for row in weights.chunks_exact_mut(columns) {
             for (w, r) in row.iter_mut().zip(&reciprocal) {
@@ -98,13 +102,19 @@ pub(crate) fn quantise(
             .collect();
         let mut codes = Vec::new();
         if index == last {
-            codes = outputs.iter().map(|o| o.range()).map(|(l, h)| (f64::from(l), f64::from(h))).collect();
+            codes = outputs
+                .iter()
+                .map(|o| o.range())
+                .map(|(l, h)| (f64::from(l), f64::from(h)))
+                .collect();
             codes.resize(columns, (0.0, 0.0));
         }
         let range = ranges.get(index);
         let s_out = range.map_or(1.0, |r| r.scale);
         let gate = 1.0 / (6.0 * f64::from(1_u32 << (2 * GATE_FRACTION_BITS)) * f64::from(s_out));
-        let skip = shape.skip.map_or(0.0, |span| f64::from(ranges[index - span].scale / s_out));
+        let skip = shape
+            .skip
+            .map_or(0.0, |span| f64::from(ranges[index - span].scale / s_out));
         layers.push(Prepared {
             shape: *shape,
             transposed: transpose(&weights, rows, columns),
@@ -120,9 +130,20 @@ pub(crate) fn quantise(
         });
         inverse.push(reciprocal);
     }
-    let low = outputs.iter().map(|&o| crate::source::real_range(o).0).collect();
-    let network = Network { layers, activation: topology.activation, low };
-    Quantised { network, inverse, input_scale }
+    let low = outputs
+        .iter()
+        .map(|&o| crate::source::real_range(o).0)
+        .collect();
+    let network = Network {
+        layers,
+        activation: topology.activation,
+        low,
+    };
+    Quantised {
+        network,
+        inverse,
+        input_scale,
+    }
 }
 
 impl Quantised {

@@ -89,9 +89,9 @@ fn accumulate<const FUSED: bool>(x: f32, b: &Vector, mut c: Vector) -> Vector {
 fn load<const ADD: bool>(c: &[f32], stride: usize) -> Accumulators {
     let mut acc: Accumulators = [[[0.0; LANES]; N]; ROWS];
     if ADD {
-        for r in 0..ROWS {
-            for v in 0..N {
-                acc[r][v] = vector(c, r * stride + v * LANES);
+        for (r, row) in acc.iter_mut().enumerate() {
+            for (v, acc) in row.iter_mut().enumerate() {
+                *acc = vector(c, r * stride + v * LANES);
             }
         }
     }
@@ -123,7 +123,14 @@ struct Product<'a, const ADD: bool> {
 impl<const ADD: bool> Vectorised for Product<'_, ADD> {
     #[inline(always)]
     fn run<const FUSED: bool>(self) {
-        let Product { a, a_stride, b, stride, c, depth } = self;
+        let Product {
+            a,
+            a_stride,
+            b,
+            stride,
+            c,
+            depth,
+        } = self;
         for (a, c) in a.chunks(a_stride * ROWS).zip(c.chunks_mut(stride * ROWS)) {
             let rows: [&[f32]; ROWS] =
                 std::array::from_fn(|r| &a[r * a_stride..r * a_stride + depth]);
@@ -154,11 +161,19 @@ struct Transposed<'a> {
 impl Vectorised for Transposed<'_> {
     #[inline(always)]
     fn run<const FUSED: bool>(self) {
-        let Transposed { a, rows, b, stride, c } = self;
+        let Transposed {
+            a,
+            rows,
+            b,
+            stride,
+            c,
+        } = self;
         for (row, c) in (0..rows).step_by(ROWS).zip(c.chunks_mut(stride * ROWS)) {
             let mut acc = load::<true>(c, stride);
             for (a_row, b_row) in a[row..].chunks(rows).zip(b.chunks(stride)) {
-                let Some(xs) = a_row.first_chunk::<ROWS>() else { continue };
+                let Some(xs) = a_row.first_chunk::<ROWS>() else {
+                    continue;
+                };
                 let b_row: [Vector; N] = std::array::from_fn(|v| vector(b_row, v * LANES));
                 for r in 0..ROWS {
                     for v in 0..N {
@@ -185,9 +200,23 @@ pub(crate) fn product(
     for at in (0..columns).step_by(COLUMNS) {
         let (b, c) = (&b[at..], &mut c[at..]);
         if add {
-            vectorised(Product::<true> { a, a_stride, b, stride, c, depth });
+            vectorised(Product::<true> {
+                a,
+                a_stride,
+                b,
+                stride,
+                c,
+                depth,
+            });
         } else {
-            vectorised(Product::<false> { a, a_stride, b, stride, c, depth });
+            vectorised(Product::<false> {
+                a,
+                a_stride,
+                b,
+                stride,
+                c,
+                depth,
+            });
         }
     }
 }
@@ -199,7 +228,13 @@ pub(crate) fn product_transposed(
     c: &mut [f32],
 ) {
     for at in (0..columns).step_by(COLUMNS) {
-        vectorised(Transposed { a, rows, b: &b[at..], stride: columns, c: &mut c[at..] });
+        vectorised(Transposed {
+            a,
+            rows,
+            b: &b[at..],
+            stride: columns,
+            c: &mut c[at..],
+        });
     }
 }
 
@@ -211,7 +246,9 @@ mod tests {
     fn matrix(seed: u64, len: usize) -> Vec<f32> {
         let stream = Stream::new(seed, Purpose::Batch, 0);
         // Small integers: every product and sum is exact, so the results must be equal.
-        (0..len as u64).map(|i| stream.below(i, 17) as f32 - 8.0).collect()
+        (0..len as u64)
+            .map(|i| stream.below(i, 17) as f32 - 8.0)
+            .collect()
     }
 
     #[test]
@@ -229,14 +266,17 @@ mod tests {
             assert!(twice.iter().zip(&plain).all(|(t, p)| *t == 2.0 * p));
             for r in 0..rows {
                 for c in 0..columns {
-                    let sum: f32 = (0..depth).map(|k| a[r * depth + k] * b[k * columns + c]).sum();
+                    let sum: f32 = (0..depth)
+                        .map(|k| a[r * depth + k] * b[k * columns + c])
+                        .sum();
                     assert_eq!(plain[r * columns + c], sum);
                 }
             }
             for k in 0..depth {
                 for c in 0..columns {
-                    let sum: f32 =
-                        (0..rows).map(|r| a[r * depth + k] * plain[r * columns + c]).sum();
+                    let sum: f32 = (0..rows)
+                        .map(|r| a[r * depth + k] * plain[r * columns + c])
+                        .sum();
                     assert_eq!(transposed[k * columns + c], 1.0 + sum);
                 }
             }

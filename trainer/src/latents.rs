@@ -44,15 +44,27 @@ impl Latents {
     }
 
     fn limits(&self) -> (f32, f32) {
-        (self.format.min_value() as f32, self.format.max_value() as f32)
+        (
+            self.format.min_value() as f32,
+            self.format.max_value() as f32,
+        )
     }
 
     /// Makes `seen` from the values.
     pub(crate) fn show(&mut self, rounding: Rounding) {
         let limits = self.limits();
-        let blocks = self.values.par_chunks(BLOCK).zip(self.seen.par_chunks_mut(BLOCK));
+        let blocks = self
+            .values
+            .par_chunks(BLOCK)
+            .zip(self.seen.par_chunks_mut(BLOCK));
         blocks.enumerate().for_each(|(block, (values, seen))| {
-            vectorised(Show { limits, rounding, first: (block * BLOCK) as u32, values, seen });
+            vectorised(Show {
+                limits,
+                rounding,
+                first: (block * BLOCK) as u32,
+                values,
+                seen,
+            });
         });
     }
 
@@ -66,13 +78,24 @@ impl Latents {
             .zip(self.moments.first.par_chunks_mut(BLOCK))
             .zip(self.moments.second.par_chunks_mut(BLOCK))
             .for_each(|(((values, gradient), first), second)| {
-                vectorised(Update { rate, unit, limits, values, gradient, first, second });
+                vectorised(Update {
+                    rate,
+                    unit,
+                    limits,
+                    values,
+                    gradient,
+                    first,
+                    second,
+                });
             });
     }
 
     /// The stored codes.
     pub(crate) fn codes(&self) -> Vec<u8> {
-        self.values.iter().map(|v| self.format.code((v + 0.5).floor() as i32)).collect()
+        self.values
+            .iter()
+            .map(|v| self.format.code((v + 0.5).floor() as i32))
+            .collect()
     }
 
     /// A small start around zero.

@@ -48,6 +48,9 @@ pub use config::{ActivationKind, Address, GridConfig, Snap, Steps, TrainConfig};
 pub use error::TrainError;
 pub use preset::Preset;
 pub use report::{Progress, StageReport, TrainReport, Trained};
-pub use schedule::Stage;
+pub use schedule::{EFFORTS, Stage};
 pub use source::Source;
 pub use train::train;
+
+#[cfg(test)]
+mod tests;

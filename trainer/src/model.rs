@@ -22,14 +22,21 @@ pub(crate) struct Ground<'a> {
     pub(crate) topology: Topology,
     /// The smallest real of each channel.
     pub(crate) low: Vec<f32>,
+    /// The value of each channel that has only one.
+    pub(crate) constants: Vec<Option<f32>>,
 }
 
 impl<'a> Ground<'a> {
-    pub(crate) fn new(config: &'a TrainConfig, source: &'a Source) -> Result<Ground<'a>, TrainError> {
+    pub(crate) fn new(
+        config: &'a TrainConfig,
+        source: &'a Source,
+    ) -> Result<Ground<'a>, TrainError> {
+        let texels = Texels::new(source);
         Ok(Ground {
             config,
             source,
-            texels: Texels::new(source),
+            constants: texels.constants(),
+            texels,
             positions: Positions::new(&shape_of(config, source)?),
             topology: Topology::new(config, source.outputs.len()),
             low: source.outputs.iter().map(|&o| real_range(o).0).collect(),
@@ -38,6 +45,25 @@ impl<'a> Ground<'a> {
 
     pub(crate) fn outputs(&self) -> &[OutputFormat] {
         &self.source.outputs
+    }
+
+    /// Takes the rows of constant channels out of a gradient. Such a row has no weights and its
+    /// value as its bias from the start, which is exact; training could only disturb it.
+    pub(crate) fn hold_constants(&self, gradient: &mut [f32]) {
+        let Some(last) = self.topology.layers.last() else {
+            return;
+        };
+        for (channel, _) in self
+            .constants
+            .iter()
+            .enumerate()
+            .filter(|(_, c)| c.is_some())
+        {
+            for k in 0..last.inputs {
+                gradient[last.weights_at + k * last.columns() + channel] = 0.0;
+            }
+            gradient[last.bias_at + channel] = 0.0;
+        }
     }
 
     pub(crate) fn embedding(&self, numbers: Numbers) -> Embedding {
@@ -70,14 +96,17 @@ impl Model {
         let seed = ground.config.seed;
         let grid = |g: usize| -> Result<Latents, TrainError> {
             let (width, height) = ground.positions.grid_sizes[g];
-            Ok(Latents::new(ground.config.grid_shape(g)?, width as usize * height as usize))
+            Ok(Latents::new(
+                ground.config.grid_shape(g)?,
+                width as usize * height as usize,
+            ))
         };
         let mut latents = [grid(0)?, grid(1)?];
         let first = latents[0].values.len() as u64;
         let stream = Stream::new(seed, Purpose::Latents, 0);
         latents[0].scatter_start(stream, 0);
         latents[1].scatter_start(stream, first);
-        let parameters = start(&ground.topology, &ground.texels, seed);
+        let parameters = start(ground, seed);
         Ok(Model {
             moments: Moments::zero(parameters.len()),
             parameters,
@@ -100,7 +129,8 @@ impl Model {
 /// Initial parameters: uniform weights after He et al. 2015, the last layer of a residual block
 /// at a tenth of that so that a block starts near the identity, and the output biases at the
 /// channels' means so that the first steps need not find them.
-fn start(topology: &Topology, texels: &Texels, seed: u64) -> Vec<f32> {
+fn start(ground: &Ground<'_>, seed: u64) -> Vec<f32> {
+    let topology = &ground.topology;
     let stream = Stream::new(seed, Purpose::Synthesizer, 0);
     let mut parameters = vec![0.0; topology.parameters];
     let last = topology.layers.len() - 1;
@@ -117,7 +147,15 @@ fn start(topology: &Topology, texels: &Texels, seed: u64) -> Vec<f32> {
         }
         if index == last {
             for channel in 0..layer.outputs {
-                parameters[layer.bias_at + channel] = texels.mean(channel);
+                let mean = ground.texels.mean(channel);
+                if let Some(value) = ground.constants[channel] {
+                    for k in 0..layer.inputs {
+                        parameters[layer.weights_at + k * layer.columns() + channel] = 0.0;
+                    }
+                    parameters[layer.bias_at + channel] = value;
+                } else {
+                    parameters[layer.bias_at + channel] = mean;
+                }
             }
         }
     }

@@ -72,7 +72,11 @@ impl Network {
                 epilogue: Epilogue::Real,
             }
         });
-        Network { layers: layers.collect(), activation: topology.activation, low: low.to_vec() }
+        Network {
+            layers: layers.collect(),
+            activation: topology.activation,
+            low: low.to_vec(),
+        }
     }
 }
 
@@ -107,7 +111,12 @@ impl Prepared {
         let bias = self.bias.as_slice();
         match &self.epilogue {
             Epilogue::Real => match source {
-                Some(source) => vectorised(RealSkip { bias, source, out, slope }),
+                Some(source) => vectorised(RealSkip {
+                    bias,
+                    source,
+                    out,
+                    slope,
+                }),
                 None if !self.shape.activated => each(RealIdentity, bias, out, slope),
                 None => match activation {
                     ActivationKind::Relu => each(RealLeaky(0.0), bias, out, slope),
@@ -121,22 +130,74 @@ impl Prepared {
                 let scales = &r.scales[..bias.len()];
                 let saturation = Saturation { zero: r.zero_point };
                 if let Some(source) = source {
-                    vectorised(IntegerSkip { bias, scales, skip: r.skip, saturation, source, out, slope });
+                    vectorised(IntegerSkip {
+                        bias,
+                        scales,
+                        skip: r.skip,
+                        saturation,
+                        source,
+                        out,
+                        slope,
+                    });
                 } else if !r.codes.is_empty() {
-                    each(IntegerCodes { scales, codes: &r.codes[..bias.len()] }, bias, out, slope);
+                    each(
+                        IntegerCodes {
+                            scales,
+                            codes: &r.codes[..bias.len()],
+                        },
+                        bias,
+                        out,
+                        slope,
+                    );
                 } else if !self.shape.activated {
-                    each(IntegerLeaky { scales, saturation, leak: 1.0 }, bias, out, slope);
+                    each(
+                        IntegerLeaky {
+                            scales,
+                            saturation,
+                            leak: 1.0,
+                        },
+                        bias,
+                        out,
+                        slope,
+                    );
                 } else {
                     match activation {
                         ActivationKind::Relu => {
-                            each(IntegerLeaky { scales, saturation, leak: 0.0 }, bias, out, slope);
+                            each(
+                                IntegerLeaky {
+                                    scales,
+                                    saturation,
+                                    leak: 0.0,
+                                },
+                                bias,
+                                out,
+                                slope,
+                            );
                         }
                         ActivationKind::Leaky { shift } => {
                             let leak = 1.0 / f64::from(1_u8 << shift);
-                            each(IntegerLeaky { scales, saturation, leak }, bias, out, slope);
+                            each(
+                                IntegerLeaky {
+                                    scales,
+                                    saturation,
+                                    leak,
+                                },
+                                bias,
+                                out,
+                                slope,
+                            );
                         }
                         ActivationKind::HardGelu => {
-                            each(IntegerGelu { scales, saturation, gate: r.gate }, bias, out, slope);
+                            each(
+                                IntegerGelu {
+                                    scales,
+                                    saturation,
+                                    gate: r.gate,
+                                },
+                                bias,
+                                out,
+                                slope,
+                            );
                         }
                     }
                 }
@@ -175,15 +236,22 @@ struct Each<'a, E> {
 }
 
 fn each<E: Element>(element: E, bias: &[f32], out: &mut [f32], slope: &mut [f32]) {
-    vectorised(Each { element, bias, out, slope });
+    vectorised(Each {
+        element,
+        bias,
+        out,
+        slope,
+    });
 }
 
 impl<E: Element> Vectorised for Each<'_, E> {
     #[inline(always)]
     fn run<const FUSED: bool>(self) {
         let columns = self.bias.len();
-        for (out, slope) in
-            self.out.chunks_exact_mut(columns).zip(self.slope.chunks_exact_mut(columns))
+        for (out, slope) in self
+            .out
+            .chunks_exact_mut(columns)
+            .zip(self.slope.chunks_exact_mut(columns))
         {
             for o in 0..columns {
                 let (value, derivative) = self.element.of(out[o] + self.bias[o], o);
@@ -220,7 +288,11 @@ impl Element for RealGelu {
     #[inline(always)]
     fn of(&self, value: f32, _: usize) -> (f32, f32) {
         let gate = (value * (1.0 / 3.0) + 0.5).clamp(0.0, 1.0);
-        let inner = if gate > 0.0 && gate < 1.0 { value * (1.0 / 3.0) } else { 0.0 };
+        let inner = if gate > 0.0 && gate < 1.0 {
+            value * (1.0 / 3.0)
+        } else {
+            0.0
+        };
         (value * gate, gate + inner)
     }
 }
@@ -236,7 +308,10 @@ impl Vectorised for RealSkip<'_> {
     #[inline(always)]
     fn run<const FUSED: bool>(self) {
         let columns = self.bias.len();
-        let rows = self.out.chunks_exact_mut(columns).zip(self.source.chunks_exact(columns));
+        let rows = self
+            .out
+            .chunks_exact_mut(columns)
+            .zip(self.source.chunks_exact(columns));
         for (out, source) in rows {
             for ((out, source), bias) in out.iter_mut().zip(source).zip(self.bias) {
                 *out += bias + source;
@@ -259,7 +334,10 @@ impl Saturation {
         let (low, high) = (f64::from(ACTIVATION_RANGE.0), f64::from(ACTIVATION_RANGE.1));
         let shifted = value + self.zero;
         let kept = shifted.max(low).min(high);
-        ((kept - self.zero) as f32, if kept == shifted { 1.0 } else { 0.0 })
+        (
+            (kept - self.zero) as f32,
+            if kept == shifted { 1.0 } else { 0.0 },
+        )
     }
 }
 
@@ -275,8 +353,11 @@ impl Element for IntegerLeaky<'_> {
     fn of(&self, value: f32, o: usize) -> (f32, f32) {
         let value = f64::from(value);
         // The rounding of a leak of 1 or 0 changes nothing.
-        let (value, leak) =
-            if value >= 0.0 { (value, 1.0) } else { (nearest(value * self.leak), self.leak) };
+        let (value, leak) = if value >= 0.0 {
+            (value, 1.0)
+        } else {
+            (nearest(value * self.leak), self.leak)
+        };
         let (out, inside) = self.saturation.of(nearest(value * self.scales[o]));
         (out, inside * (leak * self.scales[o]) as f32)
     }
@@ -293,12 +374,17 @@ impl Element for IntegerGelu<'_> {
     fn of(&self, value: f32, o: usize) -> (f32, f32) {
         let one = f64::from(6 << GATE_FRACTION_BITS);
         let (low, high) = (f64::from(GATE_RANGE.0), f64::from(GATE_RANGE.1));
-        let argument = nearest(f64::from(value) * self.scales[o]).max(low).min(high);
+        let argument = nearest(f64::from(value) * self.scales[o])
+            .max(low)
+            .min(high);
         let open = 2.0 * argument + one / 2.0;
         let gates = open.max(0.0).min(one);
         let inner = if gates == open { 2.0 * argument } else { 0.0 };
         let (out, inside) = self.saturation.of(nearest(argument * gates * self.gate));
-        (out, inside * ((gates + inner) * self.gate * self.scales[o]) as f32)
+        (
+            out,
+            inside * ((gates + inner) * self.gate * self.scales[o]) as f32,
+        )
     }
 }
 
@@ -312,7 +398,9 @@ impl Element for IntegerCodes<'_> {
     #[inline(always)]
     fn of(&self, value: f32, o: usize) -> (f32, f32) {
         let (low, high) = self.codes[o];
-        let code = nearest(f64::from(value) * self.scales[o]).max(low).min(high);
+        let code = nearest(f64::from(value) * self.scales[o])
+            .max(low)
+            .min(high);
         (code as f32, self.scales[o] as f32)
     }
 }
@@ -332,12 +420,16 @@ impl Vectorised for IntegerSkip<'_> {
     fn run<const FUSED: bool>(self) {
         let columns = self.bias.len();
         let scales = &self.scales[..columns];
-        let rows = self.out.chunks_exact_mut(columns).zip(self.slope.chunks_exact_mut(columns));
+        let rows = self
+            .out
+            .chunks_exact_mut(columns)
+            .zip(self.slope.chunks_exact_mut(columns));
         for ((out, slope), source) in rows.zip(self.source.chunks_exact(columns)) {
             for o in 0..columns {
                 let main = nearest(f64::from(out[o] + self.bias[o]) * scales[o]);
-                let (value, inside) =
-                    self.saturation.of(main + nearest(f64::from(source[o]) * self.skip));
+                let (value, inside) = self
+                    .saturation
+                    .of(main + nearest(f64::from(source[o]) * self.skip));
                 out[o] = value;
                 slope[o] = inside;
             }

@@ -42,7 +42,9 @@ impl Positions {
         let mips = 0..shape.mip_count;
         let grid_sizes = [shape.grid_size(0), shape.grid_size(1)];
         let table = |texels: u32, mip: u8, cells: [u32; 2]| AxisTable {
-            entries: (0..texels).map(|texel| entry(shape, texel, mip, cells)).collect(),
+            entries: (0..texels)
+                .map(|texel| entry(shape, texel, mip, cells))
+                .collect(),
             waves: (0..texels)
                 .flat_map(|texel| {
                     (0..shape.octaves).flat_map(move |octave| {
@@ -54,10 +56,16 @@ impl Positions {
         let [(w0, h0), (w1, h1)] = grid_sizes;
         Positions {
             axes: [
-                mips.clone().map(|m| table(shape.mip_size(m).0, m, [w0, w1])).collect(),
-                mips.clone().map(|m| table(shape.mip_size(m).1, m, [h0, h1])).collect(),
+                mips.clone()
+                    .map(|m| table(shape.mip_size(m).0, m, [w0, w1]))
+                    .collect(),
+                mips.clone()
+                    .map(|m| table(shape.mip_size(m).1, m, [h0, h1]))
+                    .collect(),
             ],
-            levels: mips.map(|m| level_input(m, shape.mip_count) as f32).collect(),
+            levels: mips
+                .map(|m| level_input(m, shape.mip_count) as f32)
+                .collect(),
             waves_per_axis: 2 * usize::from(shape.octaves),
             grid_sizes,
         }
@@ -80,7 +88,10 @@ impl Positions {
             &waves[texel as usize * per_axis..(texel as usize + 1) * per_axis]
         });
         let (waves, rest) = out.split_at_mut(2 * per_axis);
-        for ((out, x), y) in waves.chunks_exact_mut(4).zip(of_x.chunks_exact(2)).zip(of_y.chunks_exact(2))
+        for ((out, x), y) in waves
+            .chunks_exact_mut(4)
+            .zip(of_x.chunks_exact(2))
+            .zip(of_y.chunks_exact(2))
         {
             out[0] = x[0] * scale;
             out[1] = x[1] * scale;

@@ -28,7 +28,14 @@ const fn preset(
     residual_blocks: u8,
     activation: ActivationKind,
 ) -> Preset {
-    Preset { name, about, grids, hidden, residual_blocks, activation }
+    Preset {
+        name,
+        about,
+        grids,
+        hidden,
+        residual_blocks,
+        activation,
+    }
 }
 
 impl Preset {
@@ -44,20 +51,118 @@ impl Preset {
     /// of Intel's SDK, whose latents are four block-compressed textures; a grid of one channel at
     /// half and one of seven at a quarter resolution give 16 inputs with one octave of waves.
     pub const ALL: [Preset; 14] = [
-        preset("default", "a compromise of quality, rate and hardware near CNTC-16's rate", [(8, 4, 3), (16, 4, 3)], &[64], 2, LEAKY),
-        preset("cntc-16", "the CNTC paper's lowest rate", [(8, 4, 3), (16, 4, 3)], &[64], 4, LEAKY),
-        preset("cntc-32", "the CNTC paper's middle rate", [(16, 4, 3), (32, 4, 3)], &[128], 4, LEAKY),
-        preset("cntc-64", "the CNTC paper's highest rate", [(32, 4, 3), (64, 4, 3)], &[128], 4, LEAKY),
-        preset("hw-16", "a synthesizer 16 wide", [(8, 4, 3), (16, 4, 3)], &[16], 1, LEAKY),
-        preset("hw-32", "a synthesizer 32 wide", [(8, 4, 3), (16, 4, 3)], &[32], 1, LEAKY),
-        preset("hw-48", "a synthesizer 48 wide", [(8, 4, 3), (16, 4, 3)], &[48], 1, LEAKY),
-        preset("hw-64", "a synthesizer 64 wide", [(8, 4, 3), (16, 4, 3)], &[64], 1, LEAKY),
-        preset("rtxntc", "the layers of NVIDIA's RTX SDK", [(6, 4, 3), (12, 4, 3)], &[64, 48, 32], 0, GELU),
-        preset("ntc-0.2", "the NTC paper's lowest rate, without its pyramid", [(8, 2, 2), (12, 4, 3)], &[64, 64, 64], 0, GELU),
-        preset("ntc-0.5", "the NTC paper's second rate, without its pyramid", [(12, 4, 2), (20, 4, 3)], &[64, 64, 64], 0, GELU),
-        preset("ntc-1.0", "the NTC paper's third rate, without its pyramid", [(12, 2, 1), (10, 4, 2)], &[64, 64, 64], 0, GELU),
-        preset("ntc-2.25", "the NTC paper's highest rate, without its pyramid", [(16, 4, 1), (12, 4, 2)], &[64, 64, 64], 0, GELU),
-        preset("tsnc", "the layers of Intel's SDK", [(1, 4, 1), (7, 4, 2)], &[64, 64], 0, RELU),
+        preset(
+            "default",
+            "a compromise of quality, rate and hardware near CNTC-16's rate",
+            [(8, 4, 3), (16, 4, 3)],
+            &[64],
+            2,
+            LEAKY,
+        ),
+        preset(
+            "cntc-16",
+            "the CNTC paper's lowest rate",
+            [(8, 4, 3), (16, 4, 3)],
+            &[64],
+            4,
+            LEAKY,
+        ),
+        preset(
+            "cntc-32",
+            "the CNTC paper's middle rate",
+            [(16, 4, 3), (32, 4, 3)],
+            &[128],
+            4,
+            LEAKY,
+        ),
+        preset(
+            "cntc-64",
+            "the CNTC paper's highest rate",
+            [(32, 4, 3), (64, 4, 3)],
+            &[128],
+            4,
+            LEAKY,
+        ),
+        preset(
+            "hw-16",
+            "a synthesizer 16 wide",
+            [(8, 4, 3), (16, 4, 3)],
+            &[16],
+            1,
+            LEAKY,
+        ),
+        preset(
+            "hw-32",
+            "a synthesizer 32 wide",
+            [(8, 4, 3), (16, 4, 3)],
+            &[32],
+            1,
+            LEAKY,
+        ),
+        preset(
+            "hw-48",
+            "a synthesizer 48 wide",
+            [(8, 4, 3), (16, 4, 3)],
+            &[48],
+            1,
+            LEAKY,
+        ),
+        preset(
+            "hw-64",
+            "a synthesizer 64 wide",
+            [(8, 4, 3), (16, 4, 3)],
+            &[64],
+            1,
+            LEAKY,
+        ),
+        preset(
+            "rtxntc",
+            "the layers of NVIDIA's RTX SDK",
+            [(6, 4, 3), (12, 4, 3)],
+            &[64, 48, 32],
+            0,
+            GELU,
+        ),
+        preset(
+            "ntc-0.2",
+            "the NTC paper's lowest rate, without its pyramid",
+            [(8, 2, 2), (12, 4, 3)],
+            &[64, 64, 64],
+            0,
+            GELU,
+        ),
+        preset(
+            "ntc-0.5",
+            "the NTC paper's second rate, without its pyramid",
+            [(12, 4, 2), (20, 4, 3)],
+            &[64, 64, 64],
+            0,
+            GELU,
+        ),
+        preset(
+            "ntc-1.0",
+            "the NTC paper's third rate, without its pyramid",
+            [(12, 2, 1), (10, 4, 2)],
+            &[64, 64, 64],
+            0,
+            GELU,
+        ),
+        preset(
+            "ntc-2.25",
+            "the NTC paper's highest rate, without its pyramid",
+            [(16, 4, 1), (12, 4, 2)],
+            &[64, 64, 64],
+            0,
+            GELU,
+        ),
+        preset(
+            "tsnc",
+            "the layers of Intel's SDK",
+            [(1, 4, 1), (7, 4, 2)],
+            &[64, 64],
+            0,
+            RELU,
+        ),
     ];
 
     /// The preset with this name.
@@ -65,10 +170,13 @@ impl Preset {
     /// # Errors
     /// When there is none.
     pub fn by_name(name: &str) -> Result<Preset, TrainError> {
-        Preset::ALL.into_iter().find(|p| p.name == name).ok_or_else(|| TrainError::Preset {
-            found: name.to_owned(),
-            allowed: Preset::ALL.map(|p| p.name).join(", "),
-        })
+        Preset::ALL
+            .into_iter()
+            .find(|p| p.name == name)
+            .ok_or_else(|| TrainError::Preset {
+                found: name.to_owned(),
+                allowed: Preset::ALL.map(|p| p.name).join(", "),
+            })
     }
 
     /// Its configuration, at medium effort.
@@ -96,8 +204,8 @@ impl Preset {
             refine_latents: true,
             encoder_rate: 1e-3,
             latent_rate: 0.01,
-            synthesizer_rate: 0.005,
-            integer_rate: 0.3,
+            synthesizer_rate: 0.01,
+            integer_rate: 0.6,
             effort: 50,
             steps: None,
             seed: 0,

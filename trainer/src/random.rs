@@ -41,7 +41,9 @@ impl Stream {
     /// The stream of one purpose at one step.
     pub(crate) const fn new(seed: u64, purpose: Purpose, step: u64) -> Stream {
         let of_purpose = mix(seed.wrapping_add(GOLDEN.wrapping_mul(purpose as u64 + 1)));
-        Stream { key: mix(of_purpose ^ mix(step.wrapping_add(GOLDEN))) }
+        Stream {
+            key: mix(of_purpose ^ mix(step.wrapping_add(GOLDEN))),
+        }
     }
 
     /// 64 random bits.

@@ -103,14 +103,20 @@ impl Model {
         let at = stream_step(stage, step);
         let config = ground.config;
         let quantised = (stage == Stage::Integer).then(|| self.quantised(ground));
-        let numbers = if quantised.is_some() { Numbers::Integer } else { Numbers::Real };
+        let numbers = if quantised.is_some() {
+            Numbers::Integer
+        } else {
+            Numbers::Real
+        };
         let noise = Stream::new(config.seed, Purpose::Noise, at).noise_key();
         self.show(|grid| match numbers {
             Numbers::Real => Rounding::Noise(noise.wrapping_add(grid)),
             Numbers::Integer => Rounding::Nearest,
         });
         let stream = Stream::new(config.seed, Purpose::Batch, at);
-        engine.batch.draw(stream, &ground.texels.sizes, config.uniform_mips);
+        engine
+            .batch
+            .draw(stream, &ground.texels.sizes, config.uniform_mips);
         let windows = [Window::whole(&ground.positions)];
         let loss = match &quantised {
             Some(q) => engine.step(self.view(ground, &q.network, numbers, &windows)),
@@ -122,8 +128,10 @@ impl Model {
         if let Some(q) = &quantised {
             q.to_real_gradient(&ground.topology, &mut engine.parameters);
         }
+        ground.hold_constants(&mut engine.parameters);
         let rate = Rate::new(rates.synthesizer, step + 1);
-        self.moments.update(rate, &mut self.parameters, &engine.parameters);
+        self.moments
+            .update(rate, &mut self.parameters, &engine.parameters);
         if config.refine_latents {
             let embedding = ground.embedding(numbers);
             let [g0, g1] = &mut self.latents;
@@ -145,6 +153,9 @@ impl Model {
             Numbers::Integer => self.quantised(ground).network,
         };
         let windows = [Window::whole(&ground.positions)];
-        evaluate(&ground.topology, self.view(ground, &network, numbers, &windows))
+        evaluate(
+            &ground.topology,
+            self.view(ground, &network, numbers, &windows),
+        )
     }
 }

@@ -95,7 +95,15 @@ impl Embedding {
             }
         }
         let (wx, wy) = (f32::from(x.phase[1]), f32::from(y.phase[1]));
-        (out, [(ONE - wx) * (ONE - wy), wx * (ONE - wy), (ONE - wx) * wy, wx * wy])
+        (
+            out,
+            [
+                (ONE - wx) * (ONE - wy),
+                wx * (ONE - wy),
+                (ONE - wx) * wy,
+                wx * wy,
+            ],
+        )
     }
 
     /// Writes the inputs of a texel: corners of grid 0, grid 1 interpolated, waves, level.
@@ -131,7 +139,11 @@ impl Embedding {
             Numbers::Real => 1.0 / f32::from(1_u8 << INPUT_FRACTION_BITS),
             Numbers::Integer => 1.0,
         };
-        positions.tail((texel.x, texel.y, texel.mip), scale, &mut tail[..self.inputs - 4 * c0 - c1]);
+        positions.tail(
+            (texel.x, texel.y, texel.mip),
+            scale,
+            &mut tail[..self.inputs - 4 * c0 - c1],
+        );
     }
 
     /// isa's rounding of an input (ties up) and its saturation, where inputs are integers.
@@ -182,7 +194,11 @@ impl Embedding {
 /// edge, counted around the grid: the window's own way of clamping.
 #[inline(always)]
 const fn local(cell: u32, origin: u32, size: u32, cells: u32) -> u32 {
-    let inside = if cell >= origin { cell - origin } else { cell + cells - origin };
+    let inside = if cell >= origin {
+        cell - origin
+    } else {
+        cell + cells - origin
+    };
     if inside < size {
         inside
     } else if inside - size < cells - inside {

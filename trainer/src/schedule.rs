@@ -1,6 +1,6 @@
 //! Schedule: how many steps each stage has, and the learning rate at each of them.
 
-use crate::config::{Steps, TrainConfig};
+use crate::config::{CHUNKS, Steps, TILE, TrainConfig};
 use serde::{Deserialize, Serialize};
 
 /// The stages, in the order in which they run.
@@ -55,18 +55,49 @@ const PASSES: [(f64, f64); 4] = [(0.0, 8.0), (10.0, 30.0), (50.0, 240.0), (100.0
 /// The share of those passes that the integer stage has.
 const INTEGER_SHARE: f64 = 0.25;
 
-/// The least steps of the two stages together, for sets smaller than a batch.
-const LEAST: f64 = 400.0;
+/// The least steps of the two stages together, for each pass: what a set smaller than a batch
+/// gets.
+const LEAST: f64 = 8.0;
+
+/// The effort from which on the encoder runs at all, and its steps at effort 100. On two cores a
+/// step of it costs as much as fifty to two hundred steps of the refinement, and a few hundred of
+/// them do not lead anywhere; below this effort the time is better spent on the latents.
+const ENCODER: (f64, f64) = (75.0, 4000.0);
+
+/// An effort, by name.
+///
+/// The names and their numbers are those of astcenc where it has them.
+pub const EFFORTS: [(&str, u8); 5] = [
+    ("fastest", 0),
+    ("fast", 10),
+    ("medium", 50),
+    ("thorough", 75),
+    ("exhaustive", 100),
+];
 
 /// The steps of each stage for a set of `texels` texels in all its mips.
-pub(crate) fn steps(config: &TrainConfig, texels: u64) -> Steps {
+pub(crate) fn steps(config: &TrainConfig, texels: u64, batch: usize) -> Steps {
     if let Some(steps) = config.steps {
         return steps;
     }
     let passes = interpolate(&PASSES, f64::from(config.effort));
-    let steps = (passes * texels as f64 / f64::from(config.batch)).max(LEAST).round();
+    let steps = (passes * texels as f64 / batch as f64)
+        .max(LEAST * passes)
+        .round();
     let integer = (INTEGER_SHARE * steps).round();
-    Steps { encoder: 0, refine: (steps - integer) as u64, integer: integer as u64 }
+    let (from, most) = ENCODER;
+    let encoder = (most * (f64::from(config.effort) - from) / (100.0 - from)).max(0.0);
+    Steps {
+        encoder: encoder as u64,
+        refine: (steps - integer) as u64,
+        integer: integer as u64,
+    }
+}
+
+/// Texels of a step: the configured batch, or the set's texels in whole tiles where they are fewer.
+pub(crate) fn batch(config: &TrainConfig, texels: u64) -> usize {
+    let tiles = (CHUNKS * TILE) as u64;
+    texels.next_multiple_of(tiles).min(u64::from(config.batch)) as usize
 }
 
 /// The logarithm of the second number, linear in the first.
@@ -78,6 +109,25 @@ fn interpolate(points: &[(f64, f64)], at: f64) -> f64 {
         }
     }
     points.last().map_or(1.0, |p| p.1)
+}
+
+impl TrainConfig {
+    /// The configuration with an effort of 0..=100: it decides the steps (together with the set's
+    /// texels, never with a clock) and the encoder's width.
+    ///
+    /// Efforts up to 75 train latents and synthesizer alone; beyond, the encoder comes first. The
+    /// names are in [`EFFORTS`].
+    #[must_use]
+    pub fn with_effort(mut self, effort: u8) -> TrainConfig {
+        self.effort = effort.min(100);
+        self.steps = None;
+        self.encoder_width = match self.effort {
+            0..=80 => 32,
+            81..=95 => 64,
+            _ => 192,
+        };
+        self
+    }
 }
 
 /// Steps over which a rate rises from nothing.

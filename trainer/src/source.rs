@@ -34,26 +34,46 @@ impl Source {
         let (channels, height, width) = first.dim();
         let max = usize::from(limits::MAX_CHANNELS);
         if channels == 0 || channels > max {
-            return Err(TrainError::source("channels", channels, format!("1..={max}")));
+            return Err(TrainError::source(
+                "channels",
+                channels,
+                format!("1..={max}"),
+            ));
         }
         let max = limits::MAX_SIZE as usize;
         if width == 0 || height == 0 || width > max || height > max {
             let found = format!("{width}×{height}");
-            return Err(TrainError::source("mips[0]", found, format!("1..={max} along each axis")));
+            return Err(TrainError::source(
+                "mips[0]",
+                found,
+                format!("1..={max} along each axis"),
+            ));
         }
         let longest = Shape::max_mip_count(width as u32, height as u32);
         if self.mips.len() > usize::from(longest) {
-            return Err(TrainError::source("mips", self.mips.len(), format!("1..={longest}")));
+            return Err(TrainError::source(
+                "mips",
+                self.mips.len(),
+                format!("1..={longest}"),
+            ));
         }
         if self.outputs.len() != channels {
             let found = self.outputs.len();
-            return Err(TrainError::source("outputs", found, format!("{channels}, one a channel")));
+            return Err(TrainError::source(
+                "outputs",
+                found,
+                format!("{channels}, one a channel"),
+            ));
         }
         for (m, mip) in self.mips.iter().enumerate() {
             let expected = (channels, (height >> m).max(1), (width >> m).max(1));
             if mip.dim() != expected {
                 let found = format!("{:?}", mip.dim());
-                return Err(TrainError::source(format!("mips[{m}]"), found, format!("{expected:?}")));
+                return Err(TrainError::source(
+                    format!("mips[{m}]"),
+                    found,
+                    format!("{expected:?}"),
+                ));
             }
             for (channel, plane) in mip.outer_iter().enumerate() {
                 let (low, high) = real_range(self.outputs[channel]);
@@ -92,17 +112,27 @@ impl Texels {
         let mips = source.mips.iter().map(|mip| {
             let (_, height, width) = mip.dim();
             let mut out = vec![0.0; channels * height * width];
-            out.par_chunks_mut(channels * width).enumerate().for_each(|(row, out)| {
-                for (channel, plane) in mip.outer_iter().enumerate() {
-                    for (texel, &value) in plane.row(row).iter().enumerate() {
-                        out[texel * channels + channel] = value;
+            out.par_chunks_mut(channels * width)
+                .enumerate()
+                .for_each(|(row, out)| {
+                    for (channel, plane) in mip.outer_iter().enumerate() {
+                        for (texel, &value) in plane.row(row).iter().enumerate() {
+                            out[texel * channels + channel] = value;
+                        }
                     }
-                }
-            });
+                });
             out
         });
-        let sizes = source.mips.iter().map(|m| (m.dim().2 as u32, m.dim().1 as u32)).collect();
-        Texels { channels, sizes, mips: mips.collect() }
+        let sizes = source
+            .mips
+            .iter()
+            .map(|m| (m.dim().2 as u32, m.dim().1 as u32))
+            .collect();
+        Texels {
+            channels,
+            sizes,
+            mips: mips.collect(),
+        }
     }
 
     /// The channels of one texel.
@@ -113,9 +143,21 @@ impl Texels {
         &self.mips[usize::from(mip)][at..at + self.channels]
     }
 
+    /// The value of each channel that has only one.
+    pub(crate) fn constants(&self) -> Vec<Option<f32>> {
+        let of = |channel: usize| {
+            let first = self.mips.first()?.get(channel)?;
+            let mut all = self.mips.iter().flat_map(|m| m.chunks_exact(self.channels));
+            all.all(|texel| texel[channel] == *first).then_some(*first)
+        };
+        (0..self.channels).map(of).collect()
+    }
+
     /// The mean of a channel over the coarsest mip.
     pub(crate) fn mean(&self, channel: usize) -> f32 {
-        let Some(coarsest) = self.mips.last() else { return 0.0 };
+        let Some(coarsest) = self.mips.last() else {
+            return 0.0;
+        };
         let texels = coarsest.chunks_exact(self.channels);
         let count = texels.len() as f32;
         texels.map(|t| t[channel]).sum::<f32>() / count
@@ -123,7 +165,10 @@ impl Texels {
 
     /// Every texel of every mip.
     pub(crate) fn count(&self) -> u64 {
-        self.sizes.iter().map(|&(w, h)| u64::from(w) * u64::from(h)).sum()
+        self.sizes
+            .iter()
+            .map(|&(w, h)| u64::from(w) * u64::from(h))
+            .sum()
     }
 
     /// A number that changes when any value does.
@@ -161,11 +206,24 @@ mod tests {
         assert!(source(3, 1).validate().is_ok());
         let mut wrong = source(4, 4);
         wrong.mips.push(Array3::from_elem((2, 2, 3), 0.5));
-        assert!(wrong.validate().unwrap_err().to_string().contains("mips[1]"));
+        assert!(
+            wrong
+                .validate()
+                .unwrap_err()
+                .to_string()
+                .contains("mips[1]")
+        );
         for value in [1.5, -0.1, f32::NAN] {
             let mut wrong = source(4, 4);
             wrong.mips[0][[1, 2, 3]] = value;
-            assert!(wrong.validate().unwrap_err().to_string().contains("channel 1"), "{value}");
+            assert!(
+                wrong
+                    .validate()
+                    .unwrap_err()
+                    .to_string()
+                    .contains("channel 1"),
+                "{value}"
+            );
         }
         let mut wrong = source(4, 4);
         wrong.outputs.pop();
@@ -179,6 +237,9 @@ mod tests {
         let texels = Texels::new(&s);
         assert_eq!(texels.texel(4, 2, 0), [0.5, 0.25]);
         assert_eq!(texels.texel(4, 1, 0), [0.5, 0.5]);
-        assert_ne!(texels.fingerprint(), Texels::new(&source(5, 3)).fingerprint());
+        assert_ne!(
+            texels.fingerprint(),
+            Texels::new(&source(5, 3)).fingerprint()
+        );
     }
 }

@@ -20,7 +20,13 @@ pub(crate) struct Workspace {
 
 impl Workspace {
     pub(crate) fn new(topology: &Topology) -> Workspace {
-        let layers = || topology.layers.iter().map(|l| vec![0.0; TILE * l.columns()]).collect();
+        let layers = || {
+            topology
+                .layers
+                .iter()
+                .map(|l| vec![0.0; TILE * l.columns()])
+                .collect()
+        };
         let inputs = topology.layers.first().map_or(0, |l| l.rows());
         Workspace {
             inputs: vec![0.0; TILE * inputs],
@@ -48,7 +54,14 @@ impl Workspace {
             let input = before.last().unwrap_or(&self.inputs);
             let shape = layer.shape;
             let (depth, columns) = (shape.inputs, shape.columns());
-            product((input, shape.rows()), &layer.weights, out, depth, columns, false);
+            product(
+                (input, shape.rows()),
+                &layer.weights,
+                out,
+                depth,
+                columns,
+                false,
+            );
             let source = shape.skip.map(|span| before[index - span].as_slice());
             layer.finish(network.activation, source, out, &mut self.slopes[index]);
         }
@@ -99,21 +112,41 @@ impl Workspace {
                 let (source_gain, gains) = layer.skip_gains();
                 let source = &mut before[index - span];
                 let columns = shape.columns();
-                vectorised(SkipBack { columns, source_gain, gains, slope, gradient, source });
+                vectorised(SkipBack {
+                    columns,
+                    source_gain,
+                    gains,
+                    slope,
+                    gradient,
+                    source,
+                });
             } else if index != last {
                 vectorised(Scale { gradient, slope });
             }
-            let input = if index == 0 { &self.inputs } else { &self.outs[index - 1] };
+            let input = if index == 0 {
+                &self.inputs
+            } else {
+                &self.outs[index - 1]
+            };
             let weights = &mut parameters[shape.weights_at..shape.bias_at];
             product_transposed((input, shape.rows()), (gradient, shape.columns()), weights);
             let bias = &mut parameters[shape.bias_at..shape.bias_at + shape.columns()];
-            vectorised(ColumnSums { gradient, sums: bias });
+            vectorised(ColumnSums {
+                gradient,
+                sums: bias,
+            });
             // A skip path that starts here left its share already.
             let is_source = index > 0
                 && network.layers.iter().enumerate().any(|(later, l)| {
-                    l.shape.skip.is_some_and(|span| later >= span && later - span == index - 1)
+                    l.shape
+                        .skip
+                        .is_some_and(|span| later >= span && later - span == index - 1)
                 });
-            let out = if index == 0 { &mut *inputs } else { &mut before[index - 1] };
+            let out = if index == 0 {
+                &mut *inputs
+            } else {
+                &mut before[index - 1]
+            };
             let (depth, columns) = (shape.outputs, shape.rows());
             let gradient = (gradient.as_slice(), shape.columns());
             product(gradient, &layer.transposed, out, depth, columns, is_source);

@@ -73,11 +73,21 @@ impl Topology {
         let weights_at = self.parameters;
         let bias_at = weights_at + padded(inputs) * padded(outputs);
         self.parameters = bias_at + padded(outputs);
-        self.layers.push(LayerShape { inputs, outputs, activated, skip, weights_at, bias_at });
+        self.layers.push(LayerShape {
+            inputs,
+            outputs,
+            activated,
+            skip,
+            weights_at,
+            bias_at,
+        });
     }
 
     /// Multiplications per texel.
     pub(crate) fn macs(&self) -> u64 {
-        self.layers.iter().map(|l| (l.inputs * l.outputs) as u64).sum()
+        self.layers
+            .iter()
+            .map(|l| (l.inputs * l.outputs) as u64)
+            .sum()
     }
 }

@@ -43,11 +43,16 @@ pub fn train(
     config.validate()?;
     source.validate()?;
     let ground = Ground::new(config, source)?;
-    let steps = schedule::steps(config, ground.texels.count());
+    let batch = schedule::batch(config, ground.texels.count());
+    let steps = schedule::steps(config, ground.texels.count(), batch);
     let identity = checkpoint::identity(&ground)?;
     let mut run = Run {
         model: Model::new(&ground)?,
-        position: Position { stage: Stage::Encoder, step: 0, psnr_float: 0.0 },
+        position: Position {
+            stage: Stage::Encoder,
+            step: 0,
+            psnr_float: 0.0,
+        },
         ground,
         steps,
         identity,
@@ -80,7 +85,7 @@ struct Run<'a> {
 
 impl Run<'_> {
     fn all_stages(&mut self) -> Result<(), TrainError> {
-        let batch = self.ground.config.batch as usize;
+        let batch = schedule::batch(self.ground.config, self.ground.texels.count());
         let channels = self.ground.texels.channels;
         let mut engine = Engine::new(&self.ground.topology, batch, channels);
         for stage in Stage::ALL {
@@ -89,7 +94,11 @@ impl Run<'_> {
             }
             let start = Instant::now();
             if stage > self.position.stage {
-                self.position = Position { stage, step: 0, ..self.position };
+                self.position = Position {
+                    stage,
+                    step: 0,
+                    ..self.position
+                };
             }
             if self.position.step == 0 {
                 self.enter(stage);
@@ -103,7 +112,11 @@ impl Run<'_> {
                 self.position.psnr_float = decibels(errors.overall());
             }
             let seconds = start.elapsed().as_secs_f64();
-            self.stages.push(StageReport { stage, steps: self.steps.of(stage), seconds });
+            self.stages.push(StageReport {
+                stage,
+                steps: self.steps.of(stage),
+                seconds,
+            });
         }
         Ok(())
     }
@@ -122,7 +135,11 @@ impl Run<'_> {
 
     fn stage(&mut self, stage: Stage, engine: &mut Engine) -> Result<(), TrainError> {
         let steps = self.steps.of(stage);
-        let before: u64 = Stage::ALL.iter().filter(|&&s| s < stage).map(|&s| self.steps.of(s)).sum();
+        let before: u64 = Stage::ALL
+            .iter()
+            .filter(|&&s| s < stage)
+            .map(|&s| self.steps.of(s))
+            .sum();
         let mut smooth = None;
         while self.position.step < steps {
             if self.stop.load(Ordering::Relaxed) {
@@ -146,13 +163,17 @@ impl Run<'_> {
                 }
             };
             if !loss.is_finite() {
-                return Err(TrainError::Diverged { stage: stage.name(), step, loss });
+                return Err(TrainError::Diverged {
+                    stage: stage.name(),
+                    step,
+                    loss,
+                });
             }
             let loss = smooth.map_or(loss, |old: f64| old + SMOOTHING * (loss - old));
             smooth = Some(loss);
             let step = step + 1;
             self.position.step = step;
-            if step % OBSERVED == 0 || step == steps {
+            if step.is_multiple_of(OBSERVED) || step == steps {
                 (self.observer)(&Progress {
                     stage,
                     step,
@@ -163,7 +184,7 @@ impl Run<'_> {
                     psnr: decibels(loss),
                 });
             }
-            if step % self.ground.config.checkpoint_every == 0 {
+            if step.is_multiple_of(self.ground.config.checkpoint_every) {
                 self.save()?;
             }
         }
@@ -191,7 +212,14 @@ impl Run<'_> {
 
     fn finish(mut self) -> Result<Trained, TrainError> {
         let errors = self.model.evaluate(&self.ground, Numbers::Integer);
-        let Run { ground, model, position, steps, stages, .. } = self;
+        let Run {
+            ground,
+            model,
+            position,
+            steps,
+            stages,
+            ..
+        } = self;
         let psnr_quantised = decibels(errors.overall());
         let quantised = model.quantised(&ground);
         let layers = export::layers(&quantised.network, &model.ranges)?;
@@ -204,8 +232,12 @@ impl Run<'_> {
         let report = TrainReport {
             psnr_float: position.psnr_float,
             psnr_quantised,
-            psnr_channels: (0..ground.texels.channels).map(|c| decibels(errors.channel(c))).collect(),
-            psnr_mips: (0..ground.texels.sizes.len()).map(|m| decibels(errors.mip(m))).collect(),
+            psnr_channels: (0..ground.texels.channels)
+                .map(|c| decibels(errors.channel(c)))
+                .collect(),
+            psnr_mips: (0..ground.texels.sizes.len())
+                .map(|m| decibels(errors.mip(m)))
+                .collect(),
             bits_per_texel_channel: bits / (texels * ground.texels.channels as f64),
             macs: ground.topology.macs(),
             steps,
@@ -224,14 +256,22 @@ fn record(
     psnr_float: f64,
     psnr_quantised: f64,
 ) -> Vec<(String, String)> {
-    let grids = config.grids.map(|g| format!("{}ch@{}bit/{}", g.channels, g.bits, 1 << g.scale_log2));
+    let grids = config
+        .grids
+        .map(|g| format!("{}ch@{}bit/{}", g.channels, g.bits, 1 << g.scale_log2));
     let entries = [
         ("trainer", env!("CARGO_PKG_VERSION").to_owned()),
         ("grids", grids.join(" ")),
         ("hidden", format!("{:?}", config.hidden)),
-        ("blocks", format!("{}x{}", config.residual_blocks, config.layers_per_block)),
+        (
+            "blocks",
+            format!("{}x{}", config.residual_blocks, config.layers_per_block),
+        ),
         ("effort", config.effort.to_string()),
-        ("steps", format!("{}+{}+{}", steps.encoder, steps.refine, steps.integer)),
+        (
+            "steps",
+            format!("{}+{}+{}", steps.encoder, steps.refine, steps.integer),
+        ),
         ("batch", config.batch.to_string()),
         ("seed", config.seed.to_string()),
         ("psnr_float", format!("{psnr_float:.3}")),

@@ -6,15 +6,14 @@ use crate::{console, files};
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use ntmu::decoded::Decoded;
-use ntmu::isa::Asset;
 use ntmu::isa::asset::Map;
 use ntmu::isa::shape::OutputFormat;
 use ntmu::quality::{self, Quality};
 use ntmu::texture_set::TextureSet;
 use ntmu::trainer::{self, Preset, Progress, Source, TrainConfig, TrainError, Trained};
-use ntmu::built_in;
+use ntmu::{beside, built_in};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -34,6 +33,7 @@ impl Encode {
             console::note(&format!("left out {}: {}", skipped.file, skipped.reason));
         }
         let checkpoint = self.checkpoint_path();
+        self.check_places(&checkpoint)?;
         let source = source_of(&set);
         let started = Instant::now();
         let stop = stop_on_interrupt()?;
@@ -64,6 +64,23 @@ impl Encode {
         let quality = Quality::measure(&source.mips, &reals, &quality::maps_of(&trained.asset))?;
         self.report(json, &trained, &quality, started.elapsed())?;
         Ok(Verdict::Fine)
+    }
+
+    /// Finds out before the work what would be in the way after it.
+    fn check_places(&self, checkpoint: &Path) -> anyhow::Result<()> {
+        for path in [self.output.as_path(), checkpoint] {
+            beside::file_for(path).with_context(|| format!("cannot write {}", path.display()))?;
+            anyhow::ensure!(!path.is_dir(), "{}: found a folder; allowed: a file", path.display());
+        }
+        let place = checkpoint.display();
+        match (self.resume, checkpoint.exists()) {
+            (true, false) => anyhow::bail!("--resume: found no checkpoint at {place}"),
+            (false, true) => {
+                console::note(&format!("starting anew over {place}; --resume would continue it"));
+            }
+            (true, true) | (false, false) => {}
+        }
+        Ok(())
     }
 
     fn checkpoint_path(&self) -> PathBuf {
@@ -125,13 +142,12 @@ impl Encode {
         console::print(&super::super::compare::table(quality));
         console::print(&format!(
             "{:.4} bits per pixel and channel, parameters counted; {} multiplications per texel\n\
-             float network {:.2} dB, deployed integers {:.2} dB ({:+.2})\n\
+             float network {:.2} dB, deployed integers {:.2} dB\n\
              {} in {:.0} s",
             rate,
             trained.asset.macs(),
             report.psnr_float,
             quality.overall.psnr,
-            quality.overall.psnr - report.psnr_float,
             self.output.display(),
             elapsed.as_secs_f64()
         ));
