@@ -9,7 +9,10 @@ use tempfile::NamedTempFile;
 /// # Errors
 /// When the folder is missing or cannot be written.
 pub fn file_for(path: &Path) -> std::io::Result<NamedTempFile> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".ntmu-").suffix(".part");
     // Temporary files are private by default; this one becomes an ordinary file, under the umask.

@@ -1,4 +1,5 @@
 //! Assets and programs return from their bytes and texts, and nothing else is taken for one.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use ntmu::conformance::synthetic;
 use ntmu::isa::instruction::Instruction;
@@ -56,7 +57,10 @@ proptest! {
 fn every_truncation_is_refused() {
     let bytes = small(1).to_bytes();
     for length in 0..bytes.len() {
-        assert!(Asset::from_bytes(&bytes[..length]).is_err(), "{length} bytes");
+        assert!(
+            Asset::from_bytes(&bytes[..length]).is_err(),
+            "{length} bytes"
+        );
     }
     let longer = [bytes.as_slice(), &[0]].concat();
     assert!(Asset::from_bytes(&longer).is_err());
@@ -76,16 +80,24 @@ fn every_flipped_bit_is_refused() {
 #[test]
 fn a_program_that_does_not_fit_is_refused_at_its_place() {
     let asset = small(3);
-    let good = Program::compile(&asset, Layout::Linear).instructions().to_vec();
+    let good = Program::compile(&asset, Layout::Linear)
+        .instructions()
+        .to_vec();
     let refused_at = |instructions: Vec<Instruction>| {
-        Program::link(&asset, Layout::Linear, instructions).unwrap_err().at
+        Program::link(&asset, Layout::Linear, instructions)
+            .unwrap_err()
+            .at
     };
     for missing in 0..good.len() {
         let mut instructions = good.clone();
         let removed = instructions.remove(missing);
         // An activation may be left out: the program then computes something else, safely.
         let result = Program::link(&asset, Layout::Linear, instructions);
-        assert_eq!(result.is_ok(), matches!(removed, Instruction::Leaky { .. }), "{removed:?}");
+        assert_eq!(
+            result.is_ok(),
+            matches!(removed, Instruction::Leaky { .. }),
+            "{removed:?}"
+        );
     }
     assert_eq!(refused_at(good[1..].to_vec()), 0);
     let mut early_end = good.clone();

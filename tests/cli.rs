@@ -1,4 +1,5 @@
 //! The command line: what it writes, what it refuses, and how it exits.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod support;
 
@@ -36,8 +37,9 @@ fn asset_in(folder: &Path) -> PathBuf {
 
 fn files_in(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> =
-        entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    let mut names: Vec<String> = entries
+        .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
     names.sort();
     names
 }
@@ -46,14 +48,20 @@ fn files_in(folder: &Path) -> Vec<String> {
 fn study_writes_its_three_files_and_its_ledgers_add_up() {
     let folder = folder();
     let study = json(&ntmu(&["study", "--json"], folder.path()));
-    assert_eq!(files_in(&folder.path().join("study")), ["report.html", "study.json", "vectors.json"]);
+    assert_eq!(
+        files_in(&folder.path().join("study")),
+        ["report.html", "study.json", "vectors.json"]
+    );
     let text = std::fs::read_to_string(folder.path().join("study/study.json")).unwrap();
     assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), study);
     let rows = study["timing"].as_array().unwrap();
     assert_eq!(rows.len(), 6, "three units with two layouts");
     for row in rows {
         let charges = row["ledger"].as_array().unwrap();
-        let sum: u64 = charges.iter().map(|charge| charge["cycles"].as_u64().unwrap()).sum();
+        let sum: u64 = charges
+            .iter()
+            .map(|charge| charge["cycles"].as_u64().unwrap())
+            .sum();
         assert_eq!(Some(sum), row["cycles"].as_u64());
     }
     let channels = study["asset"]["channels"].as_u64().unwrap();
@@ -77,7 +85,10 @@ fn the_same_study_twice_is_the_same_bytes() {
     let folder = folder();
     for name in ["a", "b"] {
         let asset = asset_in(folder.path());
-        let output = ntmu(&["study", asset.to_str().unwrap(), "-o", name], folder.path());
+        let output = ntmu(
+            &["study", asset.to_str().unwrap(), "-o", name],
+            folder.path(),
+        );
         assert!(output.status.success(), "{}", stderr(&output));
     }
     for file in ["report.html", "study.json", "vectors.json"] {
@@ -91,21 +102,39 @@ fn decoded_images_compare_as_the_asset_does() {
     let folder = folder();
     let asset = asset_in(folder.path());
     let asset = asset.to_str().unwrap();
-    json(&ntmu(&["generate", "-o", "source", "--json"], folder.path()));
+    json(&ntmu(
+        &["generate", "-o", "source", "--json"],
+        folder.path(),
+    ));
     for (name, format) in [("png8", "png8"), ("png16", "png16"), ("exr", "exr")] {
-        let decode = ["decode", asset, "-o", name, "--mip", "0", "--format", format, "--json"];
+        let decode = [
+            "decode", asset, "-o", name, "--mip", "0", "--format", format, "--json",
+        ];
         json(&ntmu(&decode, folder.path()));
     }
-    let whole = json(&ntmu(&["compare", "source", asset, "--json"], folder.path()));
+    let whole = json(&ntmu(
+        &["compare", "source", asset, "--json"],
+        folder.path(),
+    ));
     let of = |value: &Value| value["quality"]["mips"][0]["psnr"].as_f64().unwrap();
     for name in ["png8", "png16", "exr"] {
         let images = json(&ntmu(&["compare", "source", name, "--json"], folder.path()));
         // The codes have 8 bits: every container holds them exactly, up to the f32 of a real.
         assert!((of(&whole) - of(&images)).abs() < 1e-4, "{name}");
     }
-    let decoded = json(&ntmu(&["decode", asset, "-o", "chain", "--json"], folder.path()));
-    assert_eq!(decoded["written"].as_array().unwrap().len(), 7 * 5, "7 mips of 5 maps");
-    let too_good = ntmu(&["compare", "source", asset, "--min-psnr", "90"], folder.path());
+    let decoded = json(&ntmu(
+        &["decode", asset, "-o", "chain", "--json"],
+        folder.path(),
+    ));
+    assert_eq!(
+        decoded["written"].as_array().unwrap().len(),
+        7 * 5,
+        "7 mips of 5 maps"
+    );
+    let too_good = ntmu(
+        &["compare", "source", asset, "--min-psnr", "90"],
+        folder.path(),
+    );
     assert_eq!(too_good.status.code(), Some(1));
 }
 
@@ -114,17 +143,33 @@ fn texel_shows_the_codes_that_decode_writes() {
     let folder = folder();
     let asset = asset_in(folder.path());
     let asset = asset.to_str().unwrap();
-    let texel = json(&ntmu(&["texel", asset, "10", "20", "0", "--json"], folder.path()));
-    let codes: Vec<i64> =
-        texel["codes"].as_array().unwrap().iter().map(|code| code.as_i64().unwrap()).collect();
+    let texel = json(&ntmu(
+        &["texel", asset, "10", "20", "0", "--json"],
+        folder.path(),
+    ));
+    let codes: Vec<i64> = texel["codes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|code| code.as_i64().unwrap())
+        .collect();
     let built_in = ntmu::built_in::asset().unwrap();
     let model = ntmu::decoded::Decoded::of_mip(&built_in, 0);
-    let expected: Vec<i64> =
-        (0..codes.len()).map(|channel| i64::from(model.mips[0][[channel, 20, 10]])).collect();
+    let expected: Vec<i64> = (0..codes.len())
+        .map(|channel| i64::from(model.mips[0][[channel, 20, 10]]))
+        .collect();
     assert_eq!(codes, expected);
     let table = ntmu(&["texel", asset, "10", "20", "0"], folder.path());
     let table = String::from_utf8(table.stdout).unwrap();
-    for word in ["grid 0", "grid 1", "inputs", "layer 0", "accumulators", "codes", "color"] {
+    for word in [
+        "grid 0",
+        "grid 1",
+        "inputs",
+        "layer 0",
+        "accumulators",
+        "codes",
+        "color",
+    ] {
         assert!(table.contains(word), "{word}");
     }
 }
@@ -152,7 +197,11 @@ fn wrong_input_is_refused_with_what_was_found_where_and_what_is_allowed() {
     let mut damaged = ntmu::built_in::BYTES.to_vec();
     damaged[5000] ^= 4;
     std::fs::write(folder.path().join("damaged.ntx"), damaged).unwrap();
-    std::fs::write(folder.path().join("short.ntx"), &ntmu::built_in::BYTES[..1000]).unwrap();
+    std::fs::write(
+        folder.path().join("short.ntx"),
+        &ntmu::built_in::BYTES[..1000],
+    )
+    .unwrap();
     std::fs::write(folder.path().join("foreign.ntx"), b"\x89PNG\r\n\x1a\n....").unwrap();
     std::fs::write(folder.path().join("empty.ntx"), b"").unwrap();
     std::fs::create_dir(folder.path().join("nothing")).unwrap();
@@ -171,11 +220,23 @@ fn wrong_input_is_refused_with_what_was_found_where_and_what_is_allowed() {
     ];
     for (arguments, word) in cases {
         let output = ntmu(arguments, folder.path());
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
-        assert!(stderr(&output).contains(word), "{arguments:?}: {}", stderr(&output));
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+        assert!(
+            stderr(&output).contains(word),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
         assert!(output.stdout.is_empty(), "{arguments:?}");
     }
-    assert!(!folder.path().join("out").exists(), "nothing is left of a refused decode");
+    assert!(
+        !folder.path().join("out").exists(),
+        "nothing is left of a refused decode"
+    );
 }
 
 #[cfg(not(feature = "train"))]

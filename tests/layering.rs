@@ -1,4 +1,5 @@
 //! Who may import whom, and the shape of the sources.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -52,8 +53,14 @@ fn sources(folder: &Path, extension: &str) -> Vec<PathBuf> {
 #[test]
 fn every_crate_uses_only_what_the_table_allows() {
     for (folder, allowed) in MAY_USE {
-        for dependency in dependencies(folder).iter().filter(|d| d.starts_with("ntmu")) {
-            assert!(allowed.contains(&dependency.as_str()), "{folder} uses {dependency}");
+        for dependency in dependencies(folder)
+            .iter()
+            .filter(|d| d.starts_with("ntmu"))
+        {
+            assert!(
+                allowed.contains(&dependency.as_str()),
+                "{folder} uses {dependency}"
+            );
         }
     }
 }
@@ -74,7 +81,10 @@ fn values_and_cycles_never_import_each_other() {
     for (room, forbidden) in [("exec", "time"), ("time", "exec")] {
         for path in sources(&model.join(room), "rs") {
             let text = std::fs::read_to_string(&path).unwrap();
-            for form in [format!("crate::{forbidden}"), format!("super::super::{forbidden}")] {
+            for form in [
+                format!("crate::{forbidden}"),
+                format!("super::super::{forbidden}"),
+            ] {
                 assert!(!text.contains(&form), "{} names {form}", path.display());
             }
         }
@@ -86,8 +96,9 @@ fn the_specification_computes_without_floats() {
     for path in sources(&Path::new(ROOT).join("isa/src"), "rs") {
         for (number, line) in std::fs::read_to_string(&path).unwrap().lines().enumerate() {
             let code = line.split("//").next().unwrap();
-            let words: Vec<&str> =
-                code.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').collect();
+            let words: Vec<&str> = code
+                .split(|c: char| !c.is_ascii_alphanumeric() && c != '_')
+                .collect();
             let float = words.iter().find(|word| ["f32", "f64"].contains(word));
             assert_eq!(float, None, "{}:{}: {line}", path.display(), number + 1);
         }
@@ -96,7 +107,15 @@ fn the_specification_computes_without_floats() {
 
 #[test]
 fn no_source_file_exceeds_five_hundred_lines() {
-    for folder in ["src", "isa", "model", "shaders", "trainer", "conformance", "tests"] {
+    for folder in [
+        "src",
+        "isa",
+        "model",
+        "shaders",
+        "trainer",
+        "conformance",
+        "tests",
+    ] {
         for extension in ["rs", "wgsl"] {
             for path in sources(&Path::new(ROOT).join(folder), extension) {
                 let lines = std::fs::read_to_string(&path).unwrap().lines().count();

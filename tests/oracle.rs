@@ -1,4 +1,5 @@
 //! Stage by stage, the model lies within the bound that the stage's roundings imply.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use ntmu::conformance::bound::{stage, worst};
 use ntmu::conformance::oracle::{Oracle, reals};
@@ -12,7 +13,10 @@ use proptest::prelude::*;
 fn assert_within(what: &str, model: &[f64], oracle: &[f64], bound: &[f64]) {
     assert_eq!(model.len(), oracle.len(), "{what}");
     for (lane, ((m, o), b)) in model.iter().zip(oracle).zip(bound).enumerate() {
-        assert!((m - o).abs() <= *b, "{what} lane {lane}: model {m}, oracle {o}, bound {b}");
+        assert!(
+            (m - o).abs() <= *b,
+            "{what} lane {lane}: model {m}, oracle {o}, bound {b}"
+        );
     }
 }
 
@@ -21,22 +25,38 @@ fn check_stages(asset: &Asset, request: Request) {
     let program = Program::compile(asset, Layout::Tiled);
     let taps = Decoder::new(asset, &program).taps(request);
     let oracle = Oracle::new(asset);
-    assert_within("inputs", &reals(&taps.inputs), &oracle.inputs(request), &stage::inputs(asset));
+    assert_within(
+        "inputs",
+        &reals(&taps.inputs),
+        &oracle.inputs(request),
+        &stage::inputs(asset),
+    );
     let mut input = reals(&taps.inputs);
     for (index, tap) in taps.layers.iter().enumerate() {
         let accumulators = reals(&tap.accumulators);
-        assert_eq!(accumulators, oracle.accumulators(index, &input), "layer {index}: exact sums");
+        assert_eq!(
+            accumulators,
+            oracle.accumulators(index, &input),
+            "layer {index}: exact sums"
+        );
         let activated = reals(&tap.activated);
         let bound = stage::activated(asset, index, &accumulators);
         let real = oracle.activated(index, &accumulators);
-        assert_within(&format!("layer {index} activated"), &activated, &real, &bound);
+        assert_within(
+            &format!("layer {index} activated"),
+            &activated,
+            &real,
+            &bound,
+        );
         if index + 1 == taps.layers.len() {
             let real = oracle.clamp_channels(&oracle.channels(&activated));
             let bound = stage::channels(asset, &activated);
             assert_within("channels", &reals(&taps.codes), &real, &bound);
             break;
         }
-        let source = oracle.skip_source(index).map(|from| reals(&taps.layers[from].outputs));
+        let source = oracle
+            .skip_source(index)
+            .map(|from| reals(&taps.layers[from].outputs));
         let real = oracle.outputs(index, &activated, source.as_deref());
         let bound = stage::outputs(asset, index, &activated, source.as_deref());
         let outputs = reals(&tap.outputs);

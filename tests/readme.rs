@@ -1,4 +1,5 @@
 //! Every command of the README runs.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod support;
 
@@ -13,7 +14,13 @@ fn commands() -> Vec<Vec<String>> {
     README
         .lines()
         .filter(|line| line.starts_with('|'))
-        .flat_map(|line| line.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>())
+        .flat_map(|line| {
+            line.split('`')
+                .skip(1)
+                .step_by(2)
+                .map(str::to_owned)
+                .collect::<Vec<_>>()
+        })
         .filter_map(|command| {
             let ours = command.strip_prefix("ntmu ").map(str::to_owned);
             ours.or_else(|| command.split_once(" -- ").map(|(_, rest)| rest.to_owned()))
@@ -32,7 +39,10 @@ fn every_command_of_the_readme_runs() {
         ("out.ntx", path("wall.ntx")),
         ("IMAGES", path("IMAGES")),
     ]);
-    run(&["generate".into(), "-o".into(), path("DIR")], folder.path());
+    run(
+        &["generate".into(), "-o".into(), path("DIR")],
+        folder.path(),
+    );
     let commands = commands();
     assert!(commands.len() >= 10, "{commands:?}");
     for mut command in commands {
@@ -66,7 +76,11 @@ fn every_command_of_the_readme_runs() {
 
 fn run(arguments: &[String], folder: &Path) {
     let binary = env!("CARGO_BIN_EXE_ntmu");
-    let output = Command::new(binary).args(arguments).current_dir(folder).output().unwrap();
+    let output = Command::new(binary)
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{arguments:?}: {stderr}");
 }
@@ -84,7 +98,10 @@ fn has_adapter() -> bool {
 #[test]
 fn every_file_that_the_readme_links_is_there() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let links = README.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    let links = README
+        .split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split(')').next());
     for link in links.filter(|link| !link.starts_with("http")) {
         assert!(root.join(link).is_file(), "{link}");
     }

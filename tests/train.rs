@@ -1,4 +1,5 @@
 //! What was trained is what is decoded, and an interrupted run goes on.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![cfg(feature = "train")]
 
 use ntmu::brick_wall;
@@ -20,23 +21,33 @@ fn source() -> Source {
         bit_depth: map.bit_depth,
     });
     let outputs = vec![OutputFormat::Unorm8; set.channel_count()];
-    Source { name: set.name.clone(), maps: maps.collect(), outputs, mips: set.texels }
+    Source {
+        name: set.name.clone(),
+        maps: maps.collect(),
+        outputs,
+        mips: set.texels,
+    }
 }
 
 #[test]
 fn the_model_decodes_what_the_trainer_measured() {
     for name in ["hw-16", "rtxntc", "ntc-0.2", "tsnc"] {
-        let config = TrainConfig { effort: 0, ..Preset::by_name(name).unwrap().config() };
+        let config = TrainConfig {
+            effort: 0,
+            ..Preset::by_name(name).unwrap().config()
+        };
         let source = source();
         let stop = AtomicBool::new(false);
-        let trained =
-            trainer::train(&source, &config, None, false, &stop, &mut |_| ()).unwrap();
+        let trained = trainer::train(&source, &config, None, false, &stop, &mut |_| ()).unwrap();
         let asset = trained.asset;
         let reals = Decoded::of(&asset, |_| ()).reals(&asset.shape);
         let quality = Quality::measure(&source.mips, &reals, &maps_of(&asset)).unwrap();
         let (model, trainer) = (quality.overall.psnr, trained.report.psnr_quantised);
         // Both are f64 sums over the same codes; only the order of the additions differs.
-        assert!((model - trainer).abs() < 1e-6, "{name}: model {model}, trainer {trainer}");
+        assert!(
+            (model - trainer).abs() < 1e-6,
+            "{name}: model {model}, trainer {trainer}"
+        );
     }
 }
 
@@ -46,22 +57,40 @@ fn an_interrupted_run_goes_on_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let ntmu = |arguments: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_ntmu"));
-        command.args(arguments).current_dir(folder.path()).stderr(std::process::Stdio::piped());
+        command
+            .args(arguments)
+            .current_dir(folder.path())
+            .stderr(std::process::Stdio::piped());
         command
     };
-    let generated = ntmu(&["generate", "-o", "set", "--size", "64"]).output().unwrap();
+    let generated = ntmu(&["generate", "-o", "set", "--size", "64"])
+        .output()
+        .unwrap();
     assert!(generated.status.success());
-    let encode = |output| ["encode", "set", "-o", output, "--preset", "hw-16", "--effort", "60"];
+    let encode = |output| {
+        [
+            "encode", "set", "-o", output, "--preset", "hw-16", "--effort", "60",
+        ]
+    };
 
     let mut interrupted = ntmu(&encode("a.ntx")).spawn().unwrap();
     // The first periodic checkpoint shows that the run is well under way.
     let checkpoint = folder.path().join("a.ntx.checkpoint");
     while !checkpoint.exists() {
-        assert!(interrupted.try_wait().unwrap().is_none(), "it ended before its first checkpoint");
+        assert!(
+            interrupted.try_wait().unwrap().is_none(),
+            "it ended before its first checkpoint"
+        );
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     let id = interrupted.id().to_string();
-    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    assert!(
+        Command::new("kill")
+            .args(["-INT", &id])
+            .status()
+            .unwrap()
+            .success()
+    );
     let output = interrupted.wait_with_output().unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{stderr}");
@@ -72,10 +101,17 @@ fn an_interrupted_run_goes_on_to_the_same_bytes() {
     resume.push("--resume");
     for arguments in [resume.as_slice(), &encode("b.ntx")] {
         let output = ntmu(arguments).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
     }
     let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
-    assert!(read("a.ntx") == read("b.ntx"), "the resumed run made other bytes");
+    assert!(
+        read("a.ntx") == read("b.ntx"),
+        "the resumed run made other bytes"
+    );
     assert!(!checkpoint.exists(), "a finished run leaves no checkpoint");
 
     let lost = ntmu(&resume).output().unwrap();

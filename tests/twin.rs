@@ -1,4 +1,5 @@
 //! The model and the WGSL twin agree on every bit.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![cfg(feature = "gpu")]
 
 mod support;
@@ -70,8 +71,15 @@ fn model_and_twin_agree_on_every_stage() {
             let request = Request::new(&asset.shape, width - 1, height / 2, mip).unwrap();
             let expected = ModelDevice.taps(&asset, request).unwrap();
             let found = twin.taps(&asset, request).unwrap();
-            assert_eq!(expected.keys().collect::<Vec<_>>(), found.keys().collect::<Vec<_>>());
-            assert_eq!(stage::first_divergence(&expected, &found), None, "seed {seed} mip {mip}");
+            assert_eq!(
+                expected.keys().collect::<Vec<_>>(),
+                found.keys().collect::<Vec<_>>()
+            );
+            assert_eq!(
+                stage::first_divergence(&expected, &found),
+                None,
+                "seed {seed} mip {mip}"
+            );
         }
     }
 }
@@ -85,6 +93,10 @@ fn the_twin_passes_the_texel_vectors() {
     let suites = suite::all().unwrap();
     let summary = run(&suites, &mut twin, &mut |_| ());
     assert!(summary.conforms(), "{summary:#?}");
-    let texel = summary.suites.iter().find(|suite| suite.suite == "texel").unwrap();
+    let texel = summary
+        .suites
+        .iter()
+        .find(|suite| suite.suite == "texel")
+        .unwrap();
     assert_eq!(texel.passed, texel.cases.len());
 }

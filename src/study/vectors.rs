@@ -26,10 +26,21 @@ pub fn vectors(asset: &Asset) -> Result<String, VectorError> {
         for request in diagonal(asset, mip) {
             let taps = decoder.taps(request);
             let (x, y) = (request.x(), request.y());
-            let query = TexelQuery { asset: "asset".to_owned(), x, y, mip };
+            let query = TexelQuery {
+                asset: "asset".to_owned(),
+                x,
+                y,
+                mip,
+            };
             let answer = Answer::Channels(taps.codes.clone());
             let comment = format!("({x}, {y}) of mip {mip}");
-            builder.tapped(&comment, &[flag::PLAIN], query, answer, stage::from_model(&taps));
+            builder.tapped(
+                &comment,
+                &[flag::PLAIN],
+                query,
+                answer,
+                stage::from_model(&taps),
+            );
         }
     }
     emit::to_json(&builder.build())
@@ -39,7 +50,8 @@ pub fn vectors(asset: &Asset) -> Result<String, VectorError> {
 fn diagonal(asset: &Asset, mip: u8) -> Vec<Request> {
     let (width, height) = asset.shape.mip_size(mip);
     let steps = (TEXELS_PER_MIP - 1).min(width.max(height) - 1);
-    let along = |size: u32, step: u32| if steps == 0 { 0 } else { (size - 1) * step / steps };
+    // A mip of one texel has no steps, and its only texel is at 0.
+    let along = |size: u32, step: u32| ((size - 1) * step).checked_div(steps).unwrap_or(0);
     (0..=steps)
         .filter_map(|step| {
             Request::new(&asset.shape, along(width, step), along(height, step), mip).ok()

@@ -1,10 +1,10 @@
 //! What several test binaries share.
 
 /// Says that a test is skipped and why, or fails where nothing, or no adapter, may be missing.
-pub fn skip(why: &str) {
+pub(crate) fn skip(why: &str) {
     let demanded = ["NTMU_REQUIRE_ALL", "NTMU_REQUIRE_ADAPTER"]
         .iter()
         .find(|name| std::env::var_os(name).is_some_and(|value| value == "1"));
     assert!(demanded.is_none(), "{demanded:?} is 1 and {why}");
-    println!("SKIPPED: {why}");
+    eprintln!("SKIPPED: {why}");
 }

@@ -100,7 +100,7 @@ pub struct Steps {
 pub struct TrainConfig {
     /// Grid 0, whose corners are concatenated, and grid 1, which is interpolated.
     pub grids: [GridConfig; 2],
-    /// Widths of the plain hidden layers, each with the activation; at least one.
+    /// Widths of the plain hidden layers, 1..=384, each with the activation; at least one.
     pub hidden: Vec<u16>,
     /// Residual blocks after the plain layers, as wide as the last of them.
     pub residual_blocks: u8,
@@ -148,6 +148,11 @@ pub struct TrainConfig {
     pub checkpoint_every: u64,
 }
 
+/// The widest hidden layer: 384 · 127 · 255 + 2^22 is just below 2^24, so that training can hold
+/// accumulators in floats exactly. The inputs have no zero point and may be twice as many.
+pub(crate) const WIDEST: u16 = 384;
+const _: () = assert!(WIDEST as u32 * 127 * 255 + (1 << 22) < 1 << 24);
+
 /// Chunks of a batch. Fixed, so that sums do not depend on the number of threads.
 pub(crate) const CHUNKS: usize = 8;
 /// Texels that pass through the layers together.
@@ -192,7 +197,7 @@ impl TrainConfig {
             return Err(TrainError::config("hidden", "no layer", "at least one"));
         }
         for (index, &width) in self.hidden.iter().enumerate() {
-            range(format!("hidden[{index}]"), width, 1, limits::MAX_LANES)?;
+            range(format!("hidden[{index}]"), width, 1, WIDEST)?;
         }
         range(
             "layers_per_block",

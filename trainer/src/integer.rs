@@ -18,9 +18,9 @@ use ntmu_isa::activation::GATE_FRACTION_BITS;
 use ntmu_isa::embed::INPUT_FRACTION_BITS;
 use ntmu_isa::shape::OutputFormat;
 
-/// The largest bias before the zero point is folded in. With at most 1024 products below 2^15 on
-/// top, an accumulator of a layer of up to 384 inputs stays below 2^24, where floats are exact;
-/// wider layers never come near their worst case.
+/// The largest bias before the zero point is folded in. With it and at most
+/// [`crate::config::WIDEST`] products of a weight (127) and an input without its zero point (255),
+/// an accumulator stays below 2^24, where floats are exact.
 const BIAS_LIMIT: f32 = (1 << 22) as f32;
 
 /// The smallest scale: a multiplier expresses no less than 2^−32.

@@ -204,7 +204,12 @@ impl Preset {
             refine_latents: true,
             encoder_rate: 1e-3,
             latent_rate: 0.01,
-            synthesizer_rate: 0.01,
+            // A wider layer moves further at the same rate.
+            synthesizer_rate: if self.hidden.iter().any(|&w| w > 64) {
+                0.01
+            } else {
+                0.02
+            },
             integer_rate: 0.6,
             effort: 50,
             steps: None,

@@ -19,8 +19,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Named efforts, as block encoders name them.
-const EFFORTS: [(&str, u8); 5] =
-    [("fastest", 0), ("fast", 10), ("medium", 50), ("thorough", 80), ("exhaustive", 100)];
+const EFFORTS: [(&str, u8); 5] = [
+    ("fastest", 0),
+    ("fast", 10),
+    ("medium", 50),
+    ("thorough", 80),
+    ("exhaustive", 100),
+];
 
 impl Encode {
     pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
@@ -50,7 +55,9 @@ impl Encode {
         let trained = match trained {
             Ok(trained) => trained,
             Err(error @ TrainError::Stopped { .. }) => {
-                console::note(&format!("{error}\nthe same command with --resume continues"));
+                console::note(&format!(
+                    "{error}\nthe same command with --resume continues"
+                ));
                 return Ok(Verdict::Failed);
             }
             Err(error) => return Err(error.into()),
@@ -70,13 +77,19 @@ impl Encode {
     fn check_places(&self, checkpoint: &Path) -> anyhow::Result<()> {
         for path in [self.output.as_path(), checkpoint] {
             beside::file_for(path).with_context(|| format!("cannot write {}", path.display()))?;
-            anyhow::ensure!(!path.is_dir(), "{}: found a folder; allowed: a file", path.display());
+            anyhow::ensure!(
+                !path.is_dir(),
+                "{}: found a folder; allowed: a file",
+                path.display()
+            );
         }
         let place = checkpoint.display();
         match (self.resume, checkpoint.exists()) {
             (true, false) => anyhow::bail!("--resume: found no checkpoint at {place}"),
             (false, true) => {
-                console::note(&format!("starting anew over {place}; --resume would continue it"));
+                console::note(&format!(
+                    "starting anew over {place}; --resume would continue it"
+                ));
             }
             (true, true) | (false, false) => {}
         }
@@ -93,11 +106,18 @@ impl Encode {
 
     fn config(&self) -> anyhow::Result<TrainConfig> {
         let mut config = Preset::by_name(&self.preset)?.config();
-        let named = EFFORTS.iter().find(|(name, _)| *name == self.effort).map(|(_, effort)| *effort);
+        let named = EFFORTS
+            .iter()
+            .find(|(name, _)| *name == self.effort)
+            .map(|(_, effort)| *effort);
         let effort = named.or_else(|| self.effort.parse().ok().filter(|&effort| effort <= 100));
         let names = EFFORTS.map(|(name, _)| name).join(", ");
-        let effort = effort
-            .with_context(|| format!("effort: found {:?}; allowed: 0 to 100, {names}", self.effort))?;
+        let effort = effort.with_context(|| {
+            format!(
+                "effort: found {:?}; allowed: 0 to 100, {names}",
+                self.effort
+            )
+        })?;
         config.effort = effort;
         config.seed = self.seed;
         if let Some(hidden) = &self.hidden {
@@ -108,7 +128,10 @@ impl Encode {
         }
         if let Some(channels) = &self.grids {
             let [first, second] = channels.as_slice() else {
-                anyhow::bail!("grids: found {} numbers; allowed: two, `8,16`", channels.len());
+                anyhow::bail!(
+                    "grids: found {} numbers; allowed: two, `8,16`",
+                    channels.len()
+                );
             };
             config.grids[0].channels = *first;
             config.grids[1].channels = *second;
@@ -177,7 +200,11 @@ fn source_of(set: &TextureSet) -> Source {
     for map in &set.maps {
         let name = unused(&plain_name(&map.name), &maps);
         // A map stored at more than 8 bits leaves the unit at 16.
-        let format = if map.bit_depth == 8 { OutputFormat::Unorm8 } else { OutputFormat::Unorm16 };
+        let format = if map.bit_depth == 8 {
+            OutputFormat::Unorm8
+        } else {
+            OutputFormat::Unorm16
+        };
         outputs.extend(std::iter::repeat_n(format, map.channel_count));
         maps.push(Map {
             name,
@@ -187,16 +214,29 @@ fn source_of(set: &TextureSet) -> Source {
             bit_depth: map.bit_depth,
         });
     }
-    Source { name: set.name.clone(), mips: set.texels.clone(), outputs, maps }
+    Source {
+        name: set.name.clone(),
+        mips: set.texels.clone(),
+        outputs,
+        maps,
+    }
 }
 
 /// A map's name as the format allows it: it becomes a file name.
 fn plain_name(name: &str) -> String {
     let plain = |c: char| {
-        if c.is_ascii_alphanumeric() || c == '_' || c == '-' { c } else { '_' }
+        if c.is_ascii_alphanumeric() || c == '_' || c == '-' {
+            c
+        } else {
+            '_'
+        }
     };
     let name: String = name.chars().map(plain).take(60).collect();
-    if name.is_empty() { "map".to_owned() } else { name }
+    if name.is_empty() {
+        "map".to_owned()
+    } else {
+        name
+    }
 }
 
 /// The name, with a number where another map has it.
@@ -205,7 +245,9 @@ fn unused(name: &str, maps: &[Map]) -> String {
     if is_free(name) {
         return name.to_owned();
     }
-    let numbered = (2..).map(|number| format!("{name}_{number}")).find(|n| is_free(n));
+    let numbered = (2..)
+        .map(|number| format!("{name}_{number}"))
+        .find(|n| is_free(n));
     numbered.unwrap_or_else(|| name.to_owned())
 }
 
@@ -233,6 +275,7 @@ impl Line {
         }
         self.bar.set_position(progress.step);
         let loss = progress.loss;
-        self.bar.set_message(format!("loss {loss:.2e}  about {:.2} dB", progress.psnr));
+        self.bar
+            .set_message(format!("loss {loss:.2e}  about {:.2} dB", progress.psnr));
     }
 }

@@ -1,0 +1,86 @@
+//! Claims about whole runs, and what they share.
+
+mod integers;
+mod runs;
+
+use crate::{GridConfig, Source, Steps, TrainConfig, TrainError, Trained, train};
+use ndarray::Array3;
+use ntmu_isa::asset::{Encoding, Map};
+use ntmu_isa::shape::OutputFormat;
+use std::sync::atomic::AtomicBool;
+
+/// A set with a gradient, a checkerboard, a constant channel and one of sixteen bits.
+fn source(width: usize, height: usize, mips: usize) -> Source {
+    let outputs = vec![
+        OutputFormat::Unorm8,
+        OutputFormat::Unorm8,
+        OutputFormat::Unorm8,
+        OutputFormat::Unorm16,
+        OutputFormat::Snorm8,
+    ];
+    let value = |channel: usize, y: usize, x: usize, h: usize, w: usize| match channel {
+        0 => x as f32 / w as f32,
+        1 => ((x / 2 + y / 2) % 2) as f32,
+        2 => 0.25,
+        3 => y as f32 / h as f32,
+        _ => (x as f32 * 0.7).sin() * (y as f32 * 0.3).cos(),
+    };
+    let mips = (0..mips).map(|m| {
+        let (h, w) = ((height >> m).max(1), (width >> m).max(1));
+        Array3::from_shape_fn((outputs.len(), h, w), |(c, y, x)| value(c, y, x, h, w))
+    });
+    let mips = mips.collect();
+    let maps = vec![Map {
+        name: "all".into(),
+        first_channel: 0,
+        channel_count: outputs.len() as u16,
+        encoding: Encoding::Linear,
+        bit_depth: 8,
+    }];
+    Source {
+        name: "test".into(),
+        mips,
+        outputs,
+        maps,
+    }
+}
+
+fn small() -> TrainConfig {
+    TrainConfig {
+        grids: [
+            GridConfig {
+                channels: 3,
+                bits: 4,
+                scale_log2: 2,
+            },
+            GridConfig {
+                channels: 5,
+                bits: 3,
+                scale_log2: 3,
+            },
+        ],
+        hidden: vec![20, 16],
+        residual_blocks: 2,
+        batch: 768,
+        encoder_width: 8,
+        crop: 64,
+        crops: 2,
+        steps: Some(Steps {
+            encoder: 2,
+            refine: 30,
+            integer: 30,
+        }),
+        ..TrainConfig::default()
+    }
+}
+
+fn run(source: &Source, config: &TrainConfig) -> Result<Trained, TrainError> {
+    train(
+        source,
+        config,
+        None,
+        false,
+        &AtomicBool::new(false),
+        &mut |_| {},
+    )
+}
