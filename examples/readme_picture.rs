@@ -1,4 +1,4 @@
-//! Makes the README's picture, `assets/study.png`: three maps of the built-in set, from left to
+//! Makes the README's picture, `assets/study.jpg`: three maps of the built-in set, from left to
 //! right the source, the decoded texels, and eight times their difference.
 //!
 //! `cargo run --release --example readme_picture`
@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             );
         }
     }
-    sheet.save("assets/study.png")?;
+    sheet.save("assets/study.jpg")?;
     Ok(())
 }
 

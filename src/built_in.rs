@@ -10,7 +10,8 @@ pub const SIZE: u32 = 256;
 pub const SEED: u64 = 1;
 
 /// The `.ntx` file, as committed. Remade by
-/// `cargo run --release --features train -- encode --built-in -o assets/brick_wall.ntx`.
+/// `cargo run --release --features train -- encode --built-in --preset hw-64 --grids 16,32
+/// --effort thorough -o assets/brick_wall.ntx`.
 pub const BYTES: &[u8] = include_bytes!("../assets/brick_wall.ntx");
 
 /// The built-in asset.

@@ -10,22 +10,13 @@ use ntmu::isa::asset::Map;
 use ntmu::isa::shape::OutputFormat;
 use ntmu::quality::{self, Quality};
 use ntmu::texture_set::TextureSet;
-use ntmu::trainer::{self, Preset, Progress, Source, TrainConfig, TrainError, Trained};
+use ntmu::trainer::{self, EFFORTS, Preset, Progress, Source, TrainConfig, TrainError, Trained};
 use ntmu::{beside, built_in};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-
-/// Named efforts, as block encoders name them.
-const EFFORTS: [(&str, u8); 5] = [
-    ("fastest", 0),
-    ("fast", 10),
-    ("medium", 50),
-    ("thorough", 80),
-    ("exhaustive", 100),
-];
 
 impl Encode {
     pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
@@ -111,14 +102,14 @@ impl Encode {
             .find(|(name, _)| *name == self.effort)
             .map(|(_, effort)| *effort);
         let effort = named.or_else(|| self.effort.parse().ok().filter(|&effort| effort <= 100));
-        let names = EFFORTS.map(|(name, _)| name).join(", ");
         let effort = effort.with_context(|| {
+            let names = EFFORTS.map(|(name, _)| name).join(", ");
             format!(
                 "effort: found {:?}; allowed: 0 to 100, {names}",
                 self.effort
             )
         })?;
-        config.effort = effort;
+        config = config.with_effort(effort);
         config.seed = self.seed;
         if let Some(hidden) = &self.hidden {
             config.hidden.clone_from(hidden);
