@@ -67,9 +67,11 @@ fn an_interrupted_run_goes_on_to_the_same_bytes() {
         .output()
         .unwrap();
     assert!(generated.status.success());
+    let config = "checkpoint_every = 50\nsteps = { encoder = 0, refine = 3000, integer = 1000 }\n";
+    std::fs::write(folder.path().join("run.toml"), config).unwrap();
     let encode = |output| {
         [
-            "encode", "set", "-o", output, "--preset", "hw-16", "--effort", "60",
+            "encode", "set", "-o", output, "--preset", "hw-16", "--config", "run.toml",
         ]
     };
 

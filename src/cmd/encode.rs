@@ -16,6 +16,10 @@ pub(crate) struct Encode {
     /// The shape of grids and synthesizer, by name.
     #[arg(long, default_value = "default")]
     preset: String,
+    /// A TOML file with fields of the training configuration that replace the preset's; the JSON
+    /// result shows them all under `training.config`.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
     /// How much work to spend: 0 to 100, or fastest, fast, medium, thorough, exhaustive.
     #[arg(long, default_value = "medium")]
     effort: String,

@@ -199,7 +199,7 @@ impl Preset {
             encoder_width: 32,
             crop: 256,
             crops: 4,
-            batch: 3072,
+            batch: 12_288,
             uniform_mips: 0.1,
             refine_latents: true,
             encoder_rate: 1e-3,

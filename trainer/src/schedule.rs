@@ -94,10 +94,20 @@ pub(crate) fn steps(config: &TrainConfig, texels: u64, batch: usize) -> Steps {
     }
 }
 
-/// Texels of a step: the configured batch, or the set's texels in whole tiles where they are fewer.
+/// Steps that a pass over the texels has at least, before the batch grows to the configured one: a
+/// small set needs steps more than it needs quiet gradients.
+const STEPS_PER_PASS: u64 = 64;
+
+/// The batch below which more steps no longer pay for their noise.
+const SMALL_BATCH: u64 = 3072;
+
+/// Texels of a step: the configured batch, fewer for a small set, at most the set's texels in whole
+/// tiles.
 pub(crate) fn batch(config: &TrainConfig, texels: u64) -> usize {
     let tiles = (CHUNKS * TILE) as u64;
-    texels.next_multiple_of(tiles).min(u64::from(config.batch)) as usize
+    let quick = (texels / STEPS_PER_PASS).max(SMALL_BATCH);
+    let texels_of_step = quick.min(u64::from(config.batch)).min(texels);
+    texels_of_step.next_multiple_of(tiles) as usize
 }
 
 /// The logarithm of the second number, linear in the first.
@@ -113,7 +123,7 @@ fn interpolate(points: &[(f64, f64)], at: f64) -> f64 {
 
 impl TrainConfig {
     /// The configuration with an effort of 0..=100: it decides the steps (together with the set's
-    /// texels, never with a clock) and the encoder's width.
+    /// texels, never with a clock), the batch and the encoder's width.
     ///
     /// Efforts up to 75 train latents and synthesizer alone; beyond, the encoder comes first. The
     /// names are in [`EFFORTS`].
@@ -122,6 +132,11 @@ impl TrainConfig {
         self.effort = effort.min(100);
         self.steps = None;
         self.encoder_width = if self.effort > 90 { 64 } else { 32 };
+        self.batch = match self.effort {
+            0..=20 => 3072,
+            21..=40 => 6144,
+            _ => 12_288,
+        };
         self
     }
 }

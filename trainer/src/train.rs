@@ -224,7 +224,14 @@ impl Run<'_> {
         let quantised = model.quantised(&ground);
         let layers = export::layers(&quantised.network, &model.ranges)?;
         let codes = [model.latents[0].codes(), model.latents[1].codes()];
-        let record = record(ground.config, &steps, position.psnr_float, psnr_quantised);
+        let batch = schedule::batch(ground.config, ground.texels.count());
+        let record = record(
+            ground.config,
+            &steps,
+            batch,
+            position.psnr_float,
+            psnr_quantised,
+        );
         let asset = export::asset(ground.config, ground.source, layers, codes, record)?;
         let (width, height) = ground.texels.sizes[0];
         let texels = f64::from(width) * f64::from(height);
@@ -253,6 +260,7 @@ impl Run<'_> {
 fn record(
     config: &TrainConfig,
     steps: &Steps,
+    batch: usize,
     psnr_float: f64,
     psnr_quantised: f64,
 ) -> Vec<(String, String)> {
@@ -272,7 +280,7 @@ fn record(
             "steps",
             format!("{}+{}+{}", steps.encoder, steps.refine, steps.integer),
         ),
-        ("batch", config.batch.to_string()),
+        ("batch", batch.to_string()),
         ("seed", config.seed.to_string()),
         ("psnr_float", format!("{psnr_float:.3}")),
         ("psnr_quantised", format!("{psnr_quantised:.3}")),

@@ -33,7 +33,7 @@ impl Encode {
         let source = source_of(&set);
         let started = Instant::now();
         let stop = stop_on_interrupt()?;
-        let line = Line::new();
+        let mut line = Line::new();
         let trained = trainer::train(
             &source,
             &config,
@@ -111,6 +111,9 @@ impl Encode {
         })?;
         config = config.with_effort(effort);
         config.seed = self.seed;
+        if let Some(path) = &self.config {
+            config = replaced(&config, path).with_context(|| path.display().to_string())?;
+        }
         if let Some(hidden) = &self.hidden {
             config.hidden.clone_from(hidden);
         }
@@ -167,6 +170,17 @@ impl Encode {
         ));
         Ok(())
     }
+}
+
+/// The configuration with the fields that a TOML file holds.
+fn replaced(config: &TrainConfig, path: &Path) -> anyhow::Result<TrainConfig> {
+    let fields: serde_json::Map<String, serde_json::Value> =
+        toml::from_str(&std::fs::read_to_string(path)?)?;
+    let mut value = serde_json::to_value(config)?;
+    for (name, field) in fields {
+        value[name] = field;
+    }
+    Ok(serde_json::from_value(value)?)
 }
 
 /// The first interrupt asks the trainer to stop, which leaves a checkpoint; a second ends the
@@ -243,8 +257,11 @@ fn unused(name: &str, maps: &[Map]) -> String {
 }
 
 /// The progress line: stage, step, loss, PSNR estimate, time left.
+///
+/// Where stderr is no terminal, a line for every tenth of a stage.
 struct Line {
     bar: ProgressBar,
+    tenth: (&'static str, u64),
 }
 
 impl Line {
@@ -254,10 +271,17 @@ impl Line {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        Line { bar }
+        Line {
+            bar,
+            tenth: ("", 0),
+        }
     }
 
-    fn show(&self, progress: &Progress) {
+    fn show(&mut self, progress: &Progress) {
+        if self.bar.is_hidden() {
+            self.note_tenth(progress);
+            return;
+        }
         if self.bar.prefix() != progress.stage.name() {
             // The steps of the stages cost differently: time left is that of the stage under way.
             self.bar.set_prefix(progress.stage.name());
@@ -268,5 +292,24 @@ impl Line {
         let loss = progress.loss;
         self.bar
             .set_message(format!("loss {loss:.2e}  about {:.2} dB", progress.psnr));
+    }
+
+    fn note_tenth(&mut self, progress: &Progress) {
+        let tenth = (
+            progress.stage.name(),
+            10 * progress.step / progress.stage_steps.max(1),
+        );
+        if tenth != self.tenth {
+            self.tenth = tenth;
+            console::note(&format!(
+                "{} {}/{}  loss {:.2e}  about {:.2} dB  {:.0} s",
+                progress.stage.name(),
+                progress.step,
+                progress.stage_steps,
+                progress.loss,
+                progress.psnr,
+                self.bar.elapsed().as_secs_f64()
+            ));
+        }
     }
 }
