@@ -1,6 +1,6 @@
 //! The functional pipeline: a microprogram run on values.
 //!
-//! [`Machine::step`] is the unit on one screen: every instruction, in the order of the texel's
+//! `Machine::step` is the unit on one screen: every instruction, in the order of the texel's
 //! journey, each handed to the stage of the same name. Twins share these stems with the shaders.
 
 mod embed;
