@@ -106,3 +106,29 @@ fn every_file_that_the_readme_links_is_there() {
         assert!(root.join(link).is_file(), "{link}");
     }
 }
+
+#[test]
+fn the_manifest_of_the_readme_is_read() {
+    let manifest = README
+        .split("```toml\n")
+        .nth(1)
+        .unwrap()
+        .split("```")
+        .next()
+        .unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("texture_set.toml"), manifest).unwrap();
+    let wall =
+        image::RgbaImage::from_fn(8, 8, |x, y| image::Rgba([x as u8, y as u8, 7, 9 * x as u8]));
+    wall.save(folder.path().join("wall_a.png")).unwrap();
+    let set = ntmu::texture_set::TextureSet::read(folder.path()).unwrap();
+    let maps: Vec<_> = set
+        .maps
+        .iter()
+        .map(|map| (map.name.as_str(), map.channel_count))
+        .collect();
+    assert_eq!(
+        (set.name.as_str(), maps),
+        ("old wall", vec![("color", 3), ("height", 1)])
+    );
+}
