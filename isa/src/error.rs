@@ -18,6 +18,8 @@ pub enum AssetError {
     Foreign {
         /// The first eight bytes (fewer in a shorter file).
         found: Vec<u8>,
+        /// Those of an `.ntx` file.
+        allowed: [u8; 8],
     },
     /// A version that this reader does not know.
     Version {
@@ -82,11 +84,12 @@ impl fmt::Display for AssetError {
                     "{section}: ends after {found} bytes; {needed} are needed"
                 )
             }
-            AssetError::Foreign { found } => write!(
-                f,
-                "not an .ntx file: it starts with {found:02x?}; {:02x?} is expected",
-                crate::format::MAGIC
-            ),
+            AssetError::Foreign { found, allowed } => {
+                write!(
+                    f,
+                    "not an .ntx file: it starts with {found:02x?}; allowed: {allowed:02x?}"
+                )
+            }
             AssetError::Version { found, allowed } => write!(
                 f,
                 "version {}.{}: this reader accepts {}.0 to {}.{}",

@@ -13,7 +13,7 @@
 //! | [`shape`], [`layer`], [`asset`] | one compressed texture set, validated |
 //! | [`format`](mod@format) | that asset as bytes: the `.ntx` file |
 //! | [`layout`] | where a unit's memory keeps the grids |
-//! | [`instruction`], [`assembly`], [`program`] | the microprogram that decodes one texel |
+//! | [`instruction`], [`assembly`], [`program`], [`link`] | the microprogram that decodes one texel |
 //!
 //! Three words never mix: a *code* is packed bits as stored, a *value* is the integer that a code
 //! stands for, a *real* is what the value means. Nothing in this crate computes with floats.
@@ -29,6 +29,7 @@ pub mod latent;
 pub mod layer;
 pub mod layout;
 pub mod limits;
+pub mod link;
 pub mod position;
 pub mod profile;
 pub mod program;

@@ -124,7 +124,10 @@ impl Asset {
 fn read_sections(bytes: &[u8]) -> Result<[&[u8]; 6], AssetError> {
     if bytes.len() < MAGIC.len() || bytes[..MAGIC.len()] != MAGIC {
         let found = bytes[..bytes.len().min(MAGIC.len())].to_vec();
-        return Err(AssetError::Foreign { found });
+        return Err(AssetError::Foreign {
+            found,
+            allowed: MAGIC,
+        });
     }
     let mut header = Cursor::new("header", bytes);
     header.take(MAGIC.len())?;
