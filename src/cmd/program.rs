@@ -3,6 +3,7 @@
 use crate::Verdict;
 use crate::{console, files};
 use anyhow::Context as _;
+use ntmu::isa::instruction::TABLE;
 use ntmu::isa::layout::Layout;
 use ntmu::isa::{Program as Microprogram, assembly};
 use serde_json::json;
@@ -36,7 +37,11 @@ pub(crate) fn layout(name: &str) -> Result<Layout, String> {
 impl Program {
     pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
         let Some(path) = self.asset.filter(|_| !self.manual) else {
-            console::print(&assembly::manual());
+            if json {
+                console::print_json(&describe_table())?;
+            } else {
+                console::print(&assembly::manual());
+            }
             return Ok(Verdict::Fine);
         };
         let asset = files::read_asset(&path)?;
@@ -70,4 +75,25 @@ impl Program {
         }
         Ok(Verdict::Fine)
     }
+}
+
+/// The instruction table, as the reference manual shows it.
+fn describe_table() -> Vec<serde_json::Value> {
+    TABLE
+        .iter()
+        .map(|row| {
+            let operands: Vec<_> = row
+                .operands
+                .iter()
+                .map(|o| {
+                    let prefix = o.kind.prefix();
+                    json!({ "name": o.name, "prefix": prefix, "low_bit": o.low, "end_bit": o.high })
+                })
+                .collect();
+            json!({
+                "opcode": row.opcode, "mnemonic": row.mnemonic, "operands": operands,
+                "meaning": row.summary.trim(),
+            })
+        })
+        .collect()
 }

@@ -28,21 +28,20 @@ pub struct Decoder<'a> {
     asset: &'a Asset,
     program: &'a Program,
     layers: Vec<LayerParameters>,
-    /// Lanes that a register or the accumulators must have room for.
-    lanes: usize,
 }
+
+/// Lanes of a register, and accumulators of a unit.
+const LANES: usize = ntmu_isa::limits::MAX_LANES as usize;
 
 impl<'a> Decoder<'a> {
     /// Loads an asset and a program that was compiled for it or linked against it.
     #[must_use]
     pub fn new(asset: &'a Asset, program: &'a Program) -> Decoder<'a> {
         let layers: Vec<LayerParameters> = asset.layers.iter().map(LayerParameters::new).collect();
-        let lanes = usize::from(ntmu_isa::limits::MAX_LANES);
         Decoder {
             asset,
             program,
             layers,
-            lanes,
         }
     }
 
@@ -106,8 +105,8 @@ impl<'d, 'a> Machine<'d, 'a> {
             decoder,
             corners: [Corners::default(); 2],
             codes: [Vec::new(), Vec::new()],
-            vectors: std::array::from_fn(|_| vec![0; decoder.lanes]),
-            accumulators: vec![0; decoder.lanes],
+            vectors: std::array::from_fn(|_| vec![0; LANES]),
+            accumulators: vec![0; LANES],
             is_gated: false,
             emitted: vec![0; decoder.asset.shape.outputs.len()],
         }
