@@ -145,3 +145,19 @@ fn every_texel_of_some_assets_is_within_its_bound() {
         }
     }
 }
+
+/// A scale above one, and a real below one that the model can only hold as zero.
+#[test]
+fn a_value_that_can_only_be_zero_is_no_farther_off_than_its_radius() {
+    let asset = synthetic::asset(
+        &arbitrary_spec(12_366_899_866_830_642_526),
+        9_167_981_353_273_155_287,
+    )
+    .unwrap();
+    for mip in 0..asset.shape.mip_count {
+        let (width, height) = asset.shape.mip_size(mip);
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            check(&asset, Request::new(&asset.shape, x, y, mip).unwrap());
+        }
+    }
+}

@@ -181,8 +181,9 @@ fn activation(asset: &Asset, layer: usize, row: usize, a: f64, radius: f64) -> f
 fn through(requantizer: Requantizer, value: f64, radius: f64, multiplier: Multiplier) -> f64 {
     let largest = value.abs() + radius;
     if largest < 1.0 {
-        // The model's value is an integer, therefore 0, which every requantiser rescales to 0.
-        return largest * scale(multiplier);
+        // The model's value is an integer, therefore 0, which every requantiser rescales to 0: the
+        // distance is that of the real, which lies within the radius of the model's 0.
+        return value.abs().min(radius) * scale(multiplier);
     }
     let result = (largest * scale(multiplier)).min(2_f64.powi(31));
     radius * scale(multiplier) + requantize(requantizer, largest, multiplier) + float_error(result)
