@@ -1,6 +1,7 @@
 //! Decoded: every texel of every mip of an asset, from the model.
 
 use ndarray::Array3;
+use ntmu_isa::half::Half;
 use ntmu_isa::layout::Layout;
 use ntmu_isa::shape::{OutputFormat, Shape};
 use ntmu_isa::{Asset, Program};
@@ -58,11 +59,15 @@ impl Decoded {
 }
 
 /// What a code means, on 0..=1.
-fn real(code: i32, format: OutputFormat) -> f32 {
+pub(crate) fn real(code: i32, format: OutputFormat) -> f32 {
+    if format == OutputFormat::Float16 {
+        // A code of this format is a binary16 number's bits.
+        return Half::from_bits(code as u16).to_f32();
+    }
     let (_, max) = format.range();
     let real = f64::from(code) / f64::from(max);
     match format {
-        OutputFormat::Unorm8 | OutputFormat::Unorm16 => real as f32,
+        OutputFormat::Unorm8 | OutputFormat::Unorm16 | OutputFormat::Float16 => real as f32,
         OutputFormat::Snorm8 => ((real + 1.0) / 2.0) as f32,
     }
 }

@@ -17,6 +17,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#![forbid(unsafe_code)]
+
 pub use ntmu_conformance as conformance;
 pub use ntmu_isa as isa;
 pub use ntmu_model as model;
@@ -30,10 +32,10 @@ pub mod brick_wall;
 pub mod built_in;
 pub mod decoded;
 pub mod metrics;
+pub mod precision;
 pub mod quality;
 pub mod report;
 pub mod study;
-pub mod sweep;
 pub mod texture_set;
 #[cfg(feature = "gpu")]
 pub mod twin_device;

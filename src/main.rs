@@ -1,5 +1,7 @@
 //! `ntmu`: the command line of the neural texture unit's model.
 
+#![forbid(unsafe_code)]
+
 mod cmd;
 mod console;
 mod files;

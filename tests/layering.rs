@@ -92,8 +92,10 @@ fn values_and_cycles_never_import_each_other() {
 }
 
 #[test]
-fn the_specification_computes_without_floats() {
-    for path in sources(&Path::new(ROOT).join("isa/src"), "rs") {
+fn the_specification_computes_without_floats_but_for_the_sums_of_fp16_layers() {
+    let folder = Path::new(ROOT).join("isa/src");
+    let half = folder.join("half.rs");
+    for path in sources(&folder, "rs").into_iter().filter(|p| *p != half) {
         for (number, line) in std::fs::read_to_string(&path).unwrap().lines().enumerate() {
             let code = line.split("//").next().unwrap();
             let words: Vec<&str> = code

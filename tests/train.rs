@@ -2,51 +2,87 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![cfg(feature = "train")]
 
-use ntmu::brick_wall;
+mod support;
+
 use ntmu::decoded::Decoded;
-use ntmu::isa::asset::Map;
-use ntmu::isa::shape::OutputFormat;
 use ntmu::quality::{Quality, maps_of};
-use ntmu::trainer::{self, Preset, Source, TrainConfig};
+use ntmu::trainer::{self, Precision, Preset, Steps, TrainConfig, TrainReport};
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
-fn source() -> Source {
-    let set = brick_wall::generate(64, 3);
-    let maps = set.maps.iter().map(|map| Map {
-        name: map.name.clone(),
-        first_channel: map.first_channel as u16,
-        channel_count: map.channel_count as u16,
-        encoding: map.encoding,
-        bit_depth: map.bit_depth,
-    });
-    let outputs = vec![OutputFormat::Unorm8; set.channel_count()];
-    Source {
-        name: set.name.clone(),
-        maps: maps.collect(),
-        outputs,
-        mips: set.texels,
+/// Decibels of the model's codes, and the trainer's report.
+fn decoded(config: &TrainConfig) -> (f64, TrainReport) {
+    let source = support::source::brick_wall(64);
+    let stop = AtomicBool::new(false);
+    let trained = trainer::train(&source, config, None, false, &stop, &mut |_| ()).unwrap();
+    let asset = trained.asset;
+    let reals = Decoded::of(&asset, |_| ()).reals(&asset.shape);
+    let quality = Quality::measure(&source.mips, &reals, &maps_of(&asset)).unwrap();
+    (quality.overall.psnr, trained.report)
+}
+
+fn preset(name: &str) -> TrainConfig {
+    TrainConfig {
+        effort: 0,
+        ..Preset::by_name(name).unwrap().config()
     }
 }
 
 #[test]
 fn the_model_decodes_what_the_trainer_measured() {
     for name in ["hw-16", "rtxntc", "ntc-0.2", "tsnc"] {
-        let config = TrainConfig {
-            effort: 0,
-            ..Preset::by_name(name).unwrap().config()
-        };
-        let source = source();
-        let stop = AtomicBool::new(false);
-        let trained = trainer::train(&source, &config, None, false, &stop, &mut |_| ()).unwrap();
-        let asset = trained.asset;
-        let reals = Decoded::of(&asset, |_| ()).reals(&asset.shape);
-        let quality = Quality::measure(&source.mips, &reals, &maps_of(&asset)).unwrap();
-        let (model, trainer) = (quality.overall.psnr, trained.report.psnr_quantised);
-        // Both are f64 sums over the same codes; only the order of the additions differs.
+        for precision in [Precision::Int8, Precision::Fp16] {
+            let (model, report) = decoded(&TrainConfig {
+                precision,
+                ..preset(name)
+            });
+            let trainer = report.psnr_quantised;
+            // Both are f64 sums over the same codes; only the order of the additions differs.
+            assert!(
+                (model - trainer).abs() < 1e-6,
+                "{name} {precision:?}: model {model}, trainer {trainer}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_model_decodes_layers_of_both_precisions_as_they_were_trained() {
+    let (int8, fp16) = (Precision::Int8, Precision::Fp16);
+    for (list, activation_bits) in [
+        ([fp16, int8, int8, int8], 8),
+        ([int8, int8, int8, fp16], 6),
+        ([fp16, fp16, fp16, int8], 10),
+    ] {
+        let (model, report) = decoded(&TrainConfig {
+            precision_per_layer: Some(list.to_vec()),
+            activation_bits,
+            ..preset("hw-32")
+        });
+        let trainer = report.psnr_quantised;
         assert!(
             (model - trainer).abs() < 1e-6,
-            "{name}: model {model}, trainer {trainer}"
+            "{list:?}: model {model}, trainer {trainer}"
+        );
+    }
+}
+
+#[test]
+fn halves_exported_from_reals_decode_like_the_reals() {
+    for name in ["hw-16", "rtxntc", "tsnc"] {
+        let (model, report) = decoded(&TrainConfig {
+            precision: Precision::Fp16,
+            steps: Some(Steps {
+                encoder: 0,
+                refine: 200,
+                integer: 0,
+            }),
+            ..preset(name)
+        });
+        let float = report.psnr_float;
+        assert!(
+            (model - float).abs() < 0.05,
+            "{name}: model {model}, reals {float}"
         );
     }
 }

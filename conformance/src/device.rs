@@ -138,6 +138,7 @@ impl Device for ModelDevice {
             first,
             stride,
             phase,
+            ..
         } = position;
         let corners = position.corners(query.cells, query.address_mode);
         Ok(PositionAnswer {

@@ -251,7 +251,8 @@ pub fn from_json(text: &str) -> Result<VectorFile, VectorError> {
 }
 
 /// Whether a file keeps its own promises: the schema's name, ids used once, flags explained once
-/// and used, assets whole and present, answers where there must be some.
+/// and used, profiles that bear their own name and hash, assets whole and present, answers where
+/// there must be some.
 ///
 /// # Errors
 /// The first promise that is broken.
@@ -263,7 +264,9 @@ pub fn check(file: &VectorFile) -> Result<(), VectorError> {
         let found = file.case_count.to_string();
         return Err(refuse("case_count", found, file.cases.len().to_string()));
     }
+    check_profile("profile", &file.profile)?;
     for asset in &file.assets {
+        check_profile(&format!("assets.{}.profile", asset.name), &asset.profile)?;
         let computed = format!("{:08x}", crc32fast::hash(&asset.ntx));
         if asset.crc32 != computed {
             return Err(refuse(
@@ -296,6 +299,27 @@ pub fn check(file: &VectorFile) -> Result<(), VectorError> {
     match file.notes.keys().find(|flag| !used.contains(flag.as_str())) {
         Some(flag) => Err(refuse("notes", flag, "a flag that a case has")),
         None => Ok(()),
+    }
+}
+
+/// A profile's name and hash are those of its choices, and its numbers are in range.
+fn check_profile(field: &str, profile: &ProfileRecord) -> Result<(), VectorError> {
+    if let Some((name, found, low, high)) = profile.choices.out_of_range() {
+        return Err(refuse(
+            format!("{field}.choices.{name}"),
+            found.to_string(),
+            format!("{low}..={high}"),
+        ));
+    }
+    let identity = profile.choices.identity();
+    if profile.identity == identity {
+        Ok(())
+    } else {
+        Err(refuse(
+            format!("{field}.identity"),
+            &profile.identity,
+            identity,
+        ))
     }
 }
 

@@ -67,6 +67,42 @@ flags! {
         "The synthesizer uses a hard GELU: its argument is rescaled before the gate.";
     LEAK = "Leak", "layer",
         "The synthesizer uses a leaky ReLU: what is negative is rounded on the accumulator.";
+    CLAMPED_GATE = "ClampedGate", "layer",
+        "The synthesizer uses a hard GELU whose argument is limited to 3.";
+    TABLE_LOOKUP = "TableLookup", "layer",
+        "The synthesizer uses a table: its entry replaces the accumulator and is not rescaled.";
+    WEIGHT_BITS = "WeightBits", "layer",
+        "Layers have weights of different widths.";
+    LANE_BITS = "LaneBits", "layer",
+        "Activations have fewer or more than eight bits.";
+    HALF_LAYER = "HalfLayer", "layer",
+        "The synthesizer has fp16 layers: products in f32, one rounding to fp16 at the end.";
+    MIXED_LAYERS = "MixedLayers", "layer",
+        "Integer and fp16 layers follow each other: integers are read as halves, sums become integers.";
+    SUM_ORDER = "SumOrder", "profile",
+        "The profile sums an fp16 layer in another order than product by product in f32.";
+    CONVERT = "Convert", "rounding",
+        "f32 sums become integers by another rule than ties to even.";
+    HALF_SATURATION = "HalfSaturation", "overflow",
+        "Numbers beyond 65504 occur: they saturate and do not become infinite.";
+    FLOAT_OUTPUT = "FloatOutput", "layer",
+        "A channel is fp16: its code is the number's bits.";
+    NARROW_ACCUMULATOR = "NarrowAccumulator", "profile",
+        "Accumulators of integer layers have fewer than 32 bits.";
+    OVERFLOW = "Overflow", "overflow",
+        "An accumulator goes beyond its width at this texel and wraps or saturates, product by product.";
+    NARROW_RESIDUAL = "NarrowResidual", "overflow",
+        "A rescaled skip term has fewer than 32 bits and saturates before it is added.";
+    SAW = "Saw", "embed",
+        "The waves are saws and not triangles.";
+    PADDING = "Padding", "embed",
+        "Zeros follow the level up to the width of the first layer.";
+    SAMPLING = "Sampling", "embed",
+        "Grid 0 is interpolated or the corners of grid 1 are concatenated.";
+    INPUT_BITS = "InputBits", "embed",
+        "Inputs have fewer or more than eight bits.";
+    INTERPOLATION_RULE = "InterpolationRule", "embed",
+        "Corners are interpolated by another rule than exact products of weights.";
     TIES_EVERYWHERE = "TiesEverywhere", "rounding",
         "All scales are powers of two, so that most rescalings meet ties.";
     SEPARATING = "Separating", "profile",
@@ -86,7 +122,7 @@ flags! {
     MAGIC = "Magic", "file",
         "The first eight bytes are another format's, or were changed in transfer.";
     VERSION = "Version", "file",
-        "The version is newer than this one.";
+        "The major version is another, or the version is newer than this one.";
     BIT_FLIP = "BitFlip", "file",
         "One bit of the file is flipped: a CRC-32 or a reserved field shows it.";
     TABLE = "Table", "file",

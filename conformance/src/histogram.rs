@@ -1,5 +1,7 @@
 //! Histogram: how far a device's codes lie from the oracle's reals.
 
+use crate::oracle::number;
+use ntmu_isa::shape::OutputFormat;
 use ntmu_model::Request;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -17,14 +19,15 @@ pub struct Worst {
     pub channel: usize,
     /// The code seen.
     pub code: i32,
-    /// The oracle's real, in code units.
+    /// The oracle's real, in the channel's units.
     pub oracle: f64,
 }
 
-/// Distances of codes from the oracle, in LSB of their channels.
+/// Distances of codes from the oracle, in units of their channels: one code, or 2^−10 of a `Float16`
+/// channel, see [`number::channel`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Histogram {
-    /// `code − rounded oracle` (ties up), and how often.
+    /// `code − oracle`, both rounded to units (ties up), and how often.
     pub counts: BTreeMap<i64, u64>,
     /// Codes recorded.
     pub samples: u64,
@@ -37,18 +40,35 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// Adds the channels of one texel. Both slices have one entry per channel.
-    pub fn record(&mut self, request: Request, codes: &[i32], oracle: &[f64]) {
-        for (channel, (&code, &real)) in codes.iter().zip(oracle).enumerate() {
-            self.record_channel(request, channel, code, real);
+    /// Adds the channels of one texel. All slices have one entry per channel.
+    pub fn record(
+        &mut self,
+        request: Request,
+        formats: &[OutputFormat],
+        codes: &[i32],
+        oracle: &[f64],
+    ) {
+        let channels = formats.iter().zip(codes).zip(oracle);
+        for (channel, ((&format, &code), &real)) in channels.enumerate() {
+            self.record_channel(request, (channel, format), code, real);
         }
     }
 
     /// Adds one channel of one texel.
-    pub fn record_channel(&mut self, request: Request, channel: usize, code: i32, oracle: f64) {
-        let nearest = (oracle + 0.5).floor() as i64;
-        *self.counts.entry(i64::from(code) - nearest).or_default() += 1;
-        let distance = (f64::from(code) - oracle).abs();
+    pub fn record_channel(
+        &mut self,
+        request: Request,
+        (channel, format): (usize, OutputFormat),
+        code: i32,
+        oracle: f64,
+    ) {
+        let units = number::channel(format, code);
+        let nearest = |real: f64| (real + 0.5).floor() as i64;
+        *self
+            .counts
+            .entry(nearest(units) - nearest(oracle))
+            .or_default() += 1;
+        let distance = (units - oracle).abs();
         self.samples += 1;
         self.square_sum += distance * distance;
         if self.worst.is_none() || distance > self.max {

@@ -32,11 +32,6 @@ macro_rules! by_name {
 }
 
 by_name!(
-    /// [`ntmu_isa::round::Rounding`] by name.
-    rounding,
-    ntmu_isa::round::Rounding
-);
-by_name!(
     /// [`ntmu_isa::rescale::Requantizer`] by name.
     requantizer,
     ntmu_isa::rescale::Requantizer

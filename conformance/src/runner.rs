@@ -6,7 +6,7 @@ use crate::vector::{Answer, Case, Expectation, Query, VectorFile};
 use ntmu_isa::Asset;
 use ntmu_model::Request;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What became of one case.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,6 +44,8 @@ pub struct CaseReport {
     pub comment: String,
     /// Its flags: what a failure points at.
     pub flags: Vec<String>,
+    /// Name and hash of the profile that it was decided under.
+    pub profile: String,
     /// What became of it.
     #[serde(flatten)]
     pub outcome: Outcome,
@@ -55,6 +57,8 @@ pub struct CaseReport {
 pub struct SuiteSummary {
     /// The suite.
     pub suite: String,
+    /// Names and hashes of the profiles of its cases, each once, sorted.
+    pub profiles: Vec<String>,
     /// Cases that passed.
     pub passed: usize,
     /// Cases that failed.
@@ -137,12 +141,14 @@ fn run_suite(
     let mut texels = Texels::new(file, device);
     let mut summary = SuiteSummary {
         suite: file.suite.clone(),
+        profiles: Vec::new(),
         passed: 0,
         failed: 0,
         unsupported: 0,
         diverging_stages: BTreeMap::new(),
         cases: Vec::new(),
     };
+    let mut profiles = BTreeSet::new();
     for (index, case) in file.cases.iter().enumerate() {
         let outcome = match ask(case, index, &mut texels, device) {
             Ok(found) => judge(case, found, &texels, device),
@@ -165,10 +171,13 @@ fn run_suite(
                 }
             }
         }
+        let profile = profile(file, case).to_owned();
+        profiles.insert(profile.clone());
         summary.cases.push(CaseReport {
             id: case.id.clone(),
             comment: case.comment.clone(),
             flags: case.flags.clone(),
+            profile,
             outcome,
         });
         progress(Progress {
@@ -177,7 +186,17 @@ fn run_suite(
             total: file.cases.len(),
         });
     }
+    summary.profiles = profiles.into_iter().collect();
     summary
+}
+
+/// The profile of a case: its asset's, or the file's.
+fn profile<'f>(file: &'f VectorFile, case: &Case) -> &'f str {
+    let asset = match &case.request {
+        Query::Texel(query) => file.assets.iter().find(|asset| asset.name == query.asset),
+        Query::Rescale(_) | Query::Position(_) | Query::Open(_) => None,
+    };
+    &asset.map_or(&file.profile, |asset| &asset.profile).identity
 }
 
 fn ask(

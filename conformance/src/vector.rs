@@ -1,19 +1,18 @@
-//! Vector: the records of a vector file, format v1.
+//! Vector: the records of a vector file, format v2.
 //!
 //! Integers are JSON numbers, bytes are hexadecimal digits, enums are their names; there are no
-//! floats. Unknown fields are refused. `schema/v1.json` says the same for other languages.
+//! floats. Unknown fields are refused. `schema/v2.json` says the same for other languages.
 
 use crate::names;
 use crate::stage::Taps;
 use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
 use ntmu_isa::rescale::Requantizer;
-use ntmu_isa::round::Rounding;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The schema of this version of the format.
-pub const SCHEMA: &str = "ntmu-vectors/1";
+pub const SCHEMA: &str = "ntmu-vectors/2";
 
 /// One vector file: one suite.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -53,42 +52,21 @@ pub struct Note {
     pub description: String,
 }
 
-/// A profile by the names of its choices.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// A profile: which one, and every choice by its name.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProfileRecord {
-    /// See [`Profile::input`].
-    #[serde(with = "names::rounding")]
-    pub input: Rounding,
-    /// See [`Profile::leak`].
-    #[serde(with = "names::rounding")]
-    pub leak: Rounding,
-    /// See [`Profile::requantize`].
-    #[serde(with = "names::requantizer")]
-    pub requantize: Requantizer,
-    /// See [`Profile::skip`].
-    #[serde(with = "names::requantizer")]
-    pub skip: Requantizer,
-    /// See [`Profile::output`].
-    #[serde(with = "names::requantizer")]
-    pub output: Requantizer,
+    /// Name and hash, see [`Profile::identity`].
+    pub identity: String,
+    /// The choices.
+    pub choices: Profile,
 }
 
 impl From<Profile> for ProfileRecord {
-    fn from(profile: Profile) -> ProfileRecord {
-        let Profile {
-            input,
-            leak,
-            requantize,
-            skip,
-            output,
-        } = profile;
+    fn from(choices: Profile) -> ProfileRecord {
         ProfileRecord {
-            input,
-            leak,
-            requantize,
-            skip,
-            output,
+            identity: choices.identity(),
+            choices,
         }
     }
 }
@@ -237,7 +215,7 @@ pub struct PositionAnswer {
     /// From the first to the second corner, in cells.
     pub stride: u32,
     /// From the first towards the second corner, in sixteenths.
-    pub phase: u8,
+    pub phase: u16,
     /// The two corners as cells of the grid.
     pub corners: [u32; 2],
 }

@@ -1,26 +1,34 @@
 //! The oracle by hand: one texel whose every number is worked out in the comments.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use ntmu_conformance::bound::{typical, worst};
-use ntmu_conformance::synthetic::grid;
+use ntmu_conformance::synthetic::{corners, interpolated};
 use ntmu_conformance::{Device, ModelDevice, Oracle};
 use ntmu_isa::Asset;
 use ntmu_isa::activation::Activation;
 use ntmu_isa::asset::{Encoding, Map, Metadata, Parts};
-use ntmu_isa::layer::{Layer, Skip};
+use ntmu_isa::embed::Wave;
+use ntmu_isa::half::Half;
+use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
 use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{OutputFormat, Shape};
 use ntmu_model::Request;
 
-fn layer(inputs: u16, weights: &[i8], bias: &[i32], scale: Multiplier) -> Layer {
+fn layer(inputs: u16, weights: &[i8], bias: &[i32], scale: Multiplier, zero_point: i16) -> Layer {
     Layer {
         inputs,
         outputs: bias.len() as u16,
-        weights: weights.to_vec(),
-        bias: bias.to_vec(),
-        scales: vec![scale; bias.len()],
-        zero_point: 0,
+        parameters: Parameters::Integer(IntegerParameters {
+            weight_bits: 8,
+            weights: weights.to_vec(),
+            bias: bias.to_vec(),
+            scales: vec![scale; bias.len()],
+            output_bits: 8,
+            zero_point,
+            table: Vec::new(),
+        }),
         activation: Activation::Identity,
         skip: None,
     }
@@ -31,29 +39,37 @@ fn by_hand() -> Asset {
     let half = Multiplier::power_of_two(1);
     // 3/8 = 3·2^29 / 2^32.
     let three_eighths = Multiplier::new(3 << 29, 32).expect("normalised");
-    let mut first = layer(10, &[[1; 10], [-1; 10]].concat(), &[-4, 4], three_eighths);
-    (first.zero_point, first.activation) = (-128, Activation::Relu);
-    let mut second = layer(2, &[1, 0, 0, 1], &[128, 128], half);
+    let mut first = layer(
+        10,
+        &[[1; 10], [-1; 10]].concat(),
+        &[-4, 4],
+        three_eighths,
+        -128,
+    );
+    first.activation = Activation::Relu;
+    let mut second = layer(2, &[1, 0, 0, 1], &[128, 128], half, 0);
     second.skip = Some(Skip {
         span: 1,
         scale: Multiplier::power_of_two(2),
     });
-    let third = layer(2, &[2, 3], &[7], Multiplier::power_of_two(0));
+    let third = layer(2, &[2, 3], &[7], Multiplier::power_of_two(0), 0);
     Asset::new(Parts {
         shape: Shape {
             width: 16,
             height: 8,
             mip_count: 2,
             octaves: 1,
+            wave: Wave::Triangle,
+            padding: 0,
+            input_bits: 8,
             snap: CornerSnap::Cell,
             address_mode: AddressMode::Wrap,
-            grids: [grid(1, 4, 3), grid(1, 4, 3)],
+            grids: [corners(1, 4, 3), interpolated(1, 4, 3)],
             outputs: vec![OutputFormat::Unorm8],
         },
         profile: Profile::NORMATIVE,
         // Values 8 and −4 sixteenths; 0 and 8 sixteenths.
         grids: [vec![15, 3], vec![7, 15]],
-        weight_bits: 8,
         layers: vec![first, second, third],
         metadata: Metadata {
             name: "by hand".into(),
@@ -147,9 +163,80 @@ fn the_worst_case_of_the_texel_is_the_one_worked_out_by_hand() {
 fn the_typical_error_of_the_texel_is_the_one_worked_out_by_hand() {
     let asset = by_hand();
     let oracle = Oracle::new(&asset);
-    let taps = oracle.taps(Request::new(&asset.shape, 5, 0, 0).unwrap());
+    let request = Request::new(&asset.shape, 5, 0, 0).unwrap();
+    let taps = oracle.taps(request);
     // The inputs are integers here. Derivatives of the channel: 1 at its own rounding, 2 at each of
     // layer 1's two, 2·(½ + ¼) = 3/2 at layer 0's: (1 + 4 + 4 + 9/4) / 12.
-    let square = typical::texel(&oracle, &taps);
+    let square = typical::texel(&oracle, request, &taps);
     assert!((square[0] - 11.25 / 12.0).abs() < FLOAT, "{square:?}");
+}
+
+/// The same grids and texel, an fp16 layer that reads the inputs, one that gives integers, and an
+/// integer layer with a table.
+fn by_hand_mixed() -> Asset {
+    let halves = |numbers: &[f32]| numbers.iter().map(|&n| Half::round(n)).collect::<Vec<_>>();
+    let half = |inputs: u16, weights: &[f32], bias: &[f32], quantize| Layer {
+        inputs,
+        outputs: bias.len() as u16,
+        parameters: Parameters::Half(HalfParameters {
+            weights: halves(weights),
+            bias: halves(bias),
+            quantize,
+        }),
+        activation: Activation::Identity,
+        skip: None,
+    };
+    let mut parts = by_hand().into_parts();
+    let (mut up, mut down) = ([0.0; 10], [0.0; 10]);
+    (up[0], up[1], down[6]) = (1.0, -2.0, 0.5);
+    let mut first = half(10, &[up, down].concat(), &[0.25, -1.0], None);
+    first.activation = Activation::Leaky { shift: 1 };
+    let quantize = Quantize {
+        bits: 6,
+        exponent: 4,
+        zero_point: 3,
+    };
+    let mut second = half(2, &[1.0, 0.0, 0.0, 1.0], &[0.0, 0.0], Some(quantize));
+    second.skip = Some(Skip {
+        span: 1,
+        scale: Multiplier::power_of_two(0),
+    });
+    let mut third = layer(2, &[1, 0, 0, 2], &[0, 0], Multiplier::power_of_two(1), -1);
+    third.activation = Activation::Table;
+    if let Parameters::Integer(p) = &mut third.parameters {
+        p.table = (0..256)
+            .map(|index| (index - 128) * (index - 128) / 4)
+            .collect();
+    }
+    let fourth = layer(2, &[1, 1], &[0], Multiplier::power_of_two(2), 0);
+    parts.layers = vec![first, second, third, fourth];
+    parts.shape.outputs = vec![OutputFormat::Float16];
+    Asset::new(parts).expect("a valid asset")
+}
+
+#[test]
+fn halves_tables_and_fp16_channels_are_those_worked_out_by_hand() {
+    let asset = by_hand_mixed();
+    let oracle = Oracle::new(&asset);
+    let request = Request::new(&asset.shape, 5, 0, 0).unwrap();
+    let taps = oracle.taps(request);
+    // ½ + 2·¼ + ¼ and ¾/2 − 1; leaky, 2^−1.
+    assert_eq!(taps.layers[0].accumulators, [1.25, -0.625]);
+    assert_eq!(taps.layers[0].outputs, [1.25, -0.3125]);
+    // Twice that with the skip path; 2.5·16 + 3 is above 31, −0.625·16 + 3 = −7.
+    assert_eq!(taps.layers[1].outputs, [31.0, -7.0]);
+    // Indices 15½ and −7: between 15²/4 = 56 and 16²/4 = 64; 12 and a zero point of −1.
+    assert_eq!(taps.layers[2].activated, [60.0, 12.0]);
+    assert_eq!(taps.layers[2].outputs, [59.0, 11.0]);
+    // 70/4 = 17.5, in steps of 2^−10.
+    assert_eq!(taps.channels, [17.5 * 1024.0]);
+    // The model takes the entry of 16: (63 + 11)/4 = 18.5 = 0x4ca0.
+    let codes = ModelDevice.texel_codes(&asset, &[request]);
+    assert_eq!(codes, Ok(vec![vec![0x4ca0]]));
+    let bound = worst::texel(&oracle, &taps)[0];
+    // Row 0: 31 is saturated and exact, its index one of 15 and 16: 4 off. Row 1: half a step of fp16
+    // at 0.3125, twice, times 16, and the rounding to an integer: 0.504 off; its index, with its own
+    // rounding, one of −8 to −6: 4 off. So 8/4, and half a step of fp16 around 19.5, 2^−7.
+    let expected = 1024.0 * (2.0 + 2_f64.powi(-7));
+    assert!((bound - expected).abs() < 1e-6, "{bound}");
 }

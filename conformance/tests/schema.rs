@@ -3,14 +3,18 @@
 use ntmu_conformance::flag;
 use ntmu_conformance::suite;
 use ntmu_conformance::vector::SCHEMA;
+use ntmu_isa::accumulate::Overflow;
+use ntmu_isa::filter::FilterRule;
+use ntmu_isa::half::SumOrder;
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::profile::{PointSnap, Profile};
 use ntmu_isa::rescale::Requantizer;
 use ntmu_isa::round::Rounding;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
 fn schema() -> Value {
-    serde_json::from_str(include_str!("../schema/v1.json")).expect("JSON")
+    serde_json::from_str(include_str!("../schema/v2.json")).expect("JSON")
 }
 
 /// A value against a schema, as far as this schema's words go: type, const, enum, bounds, lengths,
@@ -129,10 +133,13 @@ fn every_suite_is_valid_under_the_schema() {
 fn what_the_records_refuse_the_schema_refuses() {
     let schema = schema();
     let file = serde_json::to_value(suite::rescale::suite().unwrap()).unwrap();
-    let broken: [fn(&mut Value); 8] = [
+    let broken: [fn(&mut Value); 11] = [
         |f| f["more"] = json!(1),
-        |f| f["schema"] = json!("ntmu-vectors/2"),
+        |f| f["schema"] = json!("ntmu-vectors/1"),
         |f| f["cases"][0]["more"] = json!(1),
+        |f| f["profile"]["choices"]["sum"] = json!("tree16"),
+        |f| f["profile"]["choices"]["accumulator"]["bits"] = json!(33),
+        |f| drop(f["profile"].as_object_mut().unwrap().remove("identity")),
         |f| f["cases"][0]["request"]["rescale"]["shift"] = json!(63),
         |f| f["cases"][0]["request"]["rescale"]["value"] = json!(1.5),
         |f| f["cases"][0]["request"]["rescale"]["requantizer"] = json!("triple"),
@@ -170,6 +177,37 @@ fn the_schemas_names_are_the_specifications() {
     assert_eq!(
         position["address_mode"]["enum"],
         json!(AddressMode::ALL.map(AddressMode::name))
+    );
+    assert_eq!(
+        defs["filter_rule"]["enum"],
+        json!(FilterRule::ALL.map(FilterRule::name))
+    );
+    let choices = &defs["choices"]["properties"];
+    assert_eq!(
+        choices["point_snap"]["enum"],
+        json!(PointSnap::ALL.map(PointSnap::name))
+    );
+    assert_eq!(
+        choices["accumulator"]["properties"]["overflow"]["enum"],
+        json!(Overflow::ALL.map(Overflow::name))
+    );
+    assert_eq!(
+        choices["sum"]["enum"],
+        json!(SumOrder::ALL.map(SumOrder::name))
+    );
+    // Every choice of the profile, and no other.
+    let profile = serde_json::to_value(Profile::NORMATIVE).unwrap();
+    let names = |value: &Value| {
+        let names = value.as_object().unwrap().keys();
+        names.cloned().collect::<BTreeSet<_>>()
+    };
+    assert_eq!(names(choices), names(&profile));
+    let required = defs["choices"]["required"].as_array().unwrap().iter();
+    assert_eq!(
+        required
+            .map(|n| n.as_str().unwrap().to_owned())
+            .collect::<BTreeSet<_>>(),
+        names(&profile)
     );
     let suites: Vec<String> = suite::all()
         .unwrap()

@@ -1,4 +1,6 @@
 //! Activations: what happens to an accumulator between two layers.
+//!
+//! Those of fp16 layers, on f32 sums, are in [`crate::half::activation`].
 
 use crate::rescale::{Multiplier, Requantizer};
 use crate::round::{Rounding, saturate};
@@ -23,10 +25,17 @@ pub enum Activation {
     },
     /// x · clamp(x/3 + ½, 0, 1), see [`gate`].
     HardGelu {
-        /// From the gate's product to the layer's output scale, for all rows.
+        /// From the gate's product to the layer's output scale, for all rows; one in an fp16 layer.
         scale: Multiplier,
+        /// x is first limited to 3, as in NVIDIA's RTX SDK.
+        is_clamped: bool,
     },
+    /// An entry of the layer's table, see [`table_index`]; not in an fp16 layer.
+    Table,
 }
+
+/// Entries of a layer's table.
+pub const TABLE_ENTRIES: usize = 256;
 
 /// The largest shift of a leaky ReLU.
 pub const MAX_LEAK_SHIFT: u8 = 7;
@@ -39,8 +48,49 @@ impl Activation {
             Activation::Identity => "identity",
             Activation::Relu => "relu",
             Activation::Leaky { .. } => "leaky",
-            Activation::HardGelu { .. } => "hard-gelu",
+            Activation::HardGelu {
+                is_clamped: false, ..
+            } => "hard-gelu",
+            Activation::HardGelu {
+                is_clamped: true, ..
+            } => "hard-gelu-3",
+            Activation::Table => "table",
         }
+    }
+}
+
+impl Activation {
+    /// The code in a file, without its parameters.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            Activation::Identity => 0,
+            Activation::Relu => 1,
+            Activation::Leaky { .. } => 2,
+            Activation::HardGelu {
+                is_clamped: false, ..
+            } => 3,
+            Activation::HardGelu {
+                is_clamped: true, ..
+            } => 4,
+            Activation::Table => 5,
+        }
+    }
+
+    /// The activation with this code and these parameters, if there is one.
+    #[must_use]
+    pub const fn from_code(code: u8, shift: u8, scale: Multiplier) -> Option<Activation> {
+        Some(match code {
+            0 => Activation::Identity,
+            1 => Activation::Relu,
+            2 => Activation::Leaky { shift },
+            3 | 4 => Activation::HardGelu {
+                scale,
+                is_clamped: code == 4,
+            },
+            5 => Activation::Table,
+            _ => return None,
+        })
     }
 }
 
@@ -67,14 +117,33 @@ pub const fn gate(argument: i32) -> i32 {
     argument * six_gates
 }
 
-/// A hard GELU's argument from its accumulator: rescaled per row, saturated to 16 bits.
+/// A hard GELU's argument from its accumulator: rescaled per row, saturated to 16 bits, or to at
+/// most 3 if the activation is clamped.
 #[must_use]
-pub const fn gate_argument(accumulator: i32, scale: Multiplier, requantizer: Requantizer) -> i32 {
+pub const fn gate_argument(
+    accumulator: i32,
+    scale: Multiplier,
+    requantizer: Requantizer,
+    is_clamped: bool,
+) -> i32 {
+    let high = if is_clamped {
+        3 << GATE_FRACTION_BITS
+    } else {
+        GATE_RANGE.1
+    };
     saturate(
         requantizer.apply(accumulator, scale) as i64,
         GATE_RANGE.0,
-        GATE_RANGE.1,
+        high,
     )
+}
+
+/// The entry of a layer's table for an accumulator: rescaled per row, saturated to a signed byte,
+/// from entry 0 for −128 on.
+#[must_use]
+pub const fn table_index(accumulator: i32, scale: Multiplier, requantizer: Requantizer) -> usize {
+    let byte = saturate(requantizer.apply(accumulator, scale) as i64, -128, 127);
+    (byte + 128) as usize
 }
 
 #[cfg(test)]

@@ -47,7 +47,7 @@ pub fn disassemble(instruction: &Instruction) -> String {
         .zip(instruction.operands())
         .map(|(field, number)| format!("{}{number}", field.kind.prefix()))
         .collect();
-    format!("{:<13}{}", row.mnemonic, operands.join(", "))
+    format!("{:<14}{}", row.mnemonic, operands.join(", "))
         .trim_end()
         .to_owned()
 }

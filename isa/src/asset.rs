@@ -2,13 +2,13 @@
 //!
 //! An [`Asset`] is the proof that its parts fit together; decoding one cannot fail.
 
-use crate::activation::{Activation, MAX_LEAK_SHIFT};
+use crate::check_layers::check_layers;
 use crate::embed::MAX_OCTAVES;
 use crate::error::AssetError;
 use crate::layer::Layer;
 use crate::limits;
 use crate::profile::Profile;
-use crate::shape::Shape;
+use crate::shape::{LaneFormat, Shape};
 
 /// How the channels of a map are to be understood by whoever shows it. The unit does not care.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -91,8 +91,6 @@ pub struct Parts {
     pub profile: Profile,
     /// Codes of each grid: rows of cells, cells of channels.
     pub grids: [Vec<u8>; 2],
-    /// Bits of a weight in the file, 2..=8.
-    pub weight_bits: u8,
     /// The synthesizer, first layer first.
     pub layers: Vec<Layer>,
     /// Names and training record.
@@ -123,6 +121,7 @@ impl Asset {
         for (index, codes) in parts.grids.iter().enumerate() {
             check_grid(&parts.shape, index, codes)?;
         }
+        check_profile(&parts.profile)?;
         check_layers(&parts)?;
         check_metadata(&parts)?;
         Ok(Asset { parts })
@@ -151,16 +150,30 @@ impl Asset {
             .sum()
     }
 
-    /// Bits of the synthesizer's parameters as a unit stores them: weights at their width, and for
-    /// every row a 32-bit bias, a 31-bit mantissa and a 6-bit shift rounded up to 40 bits.
+    /// Bits of the synthesizer's numbers as a unit stores them.
     #[must_use]
     pub fn parameter_bits(&self) -> u64 {
+        let bias_bits = self.profile.bias_bits;
         self.layers
             .iter()
-            .map(|l| {
-                u64::from(l.macs()) * u64::from(self.weight_bits) + u64::from(l.outputs) * (32 + 40)
-            })
+            .map(|l| l.parameter_bits(bias_bits))
             .sum()
+    }
+
+    /// What the register that a layer reads holds: the inputs', or that of the layer before.
+    #[must_use]
+    pub fn input_format(&self, layer: usize) -> LaneFormat {
+        match layer.checked_sub(1) {
+            None => self.shape.input_format(),
+            Some(before) => self.layers[before].output_format(),
+        }
+    }
+
+    /// The layer whose output a layer's skip path starts from.
+    #[must_use]
+    pub fn skip_source(&self, layer: usize) -> Option<usize> {
+        let skip = self.layers[layer].skip?;
+        layer.checked_sub(usize::from(skip.span))
     }
 
     /// Multiplications per texel.
@@ -171,7 +184,7 @@ impl Asset {
 }
 
 /// `found`, if it is in `low..=high`.
-fn in_range<T: PartialOrd + std::fmt::Display>(
+pub(crate) fn in_range<T: PartialOrd + std::fmt::Display>(
     field: impl Into<String>,
     found: T,
     low: T,
@@ -190,6 +203,9 @@ pub(crate) fn check_shape(shape: &Shape) -> Result<(), AssetError> {
     let longest = Shape::max_mip_count(shape.width, shape.height);
     in_range("shape.mip_count", shape.mip_count, 1, longest)?;
     in_range("shape.octaves", shape.octaves, 0, MAX_OCTAVES)?;
+    in_range("shape.padding", shape.padding, 0, limits::MAX_PADDING)?;
+    let (low, high) = limits::LANE_BITS;
+    in_range("shape.input_bits", shape.input_bits, low, high)?;
     in_range(
         "shape.channels",
         shape.outputs.len() as u64,
@@ -215,6 +231,13 @@ pub(crate) fn check_shape(shape: &Shape) -> Result<(), AssetError> {
     )
 }
 
+pub(crate) fn check_profile(profile: &Profile) -> Result<(), AssetError> {
+    match profile.out_of_range() {
+        None => Ok(()),
+        Some((field, found, low, high)) => in_range(format!("profile.{field}"), found, low, high),
+    }
+}
+
 fn check_grid(shape: &Shape, index: usize, codes: &[u8]) -> Result<(), AssetError> {
     let expected = shape.grid_latents(index);
     if codes.len() as u64 != expected {
@@ -229,108 +252,6 @@ fn check_grid(shape: &Shape, index: usize, codes: &[u8]) -> Result<(), AssetErro
         Some(at) => in_range(format!("grid{index}.code[{at}]"), codes[at], 0, max),
         None => Ok(()),
     }
-}
-
-fn check_layers(parts: &Parts) -> Result<(), AssetError> {
-    let (low, high) = limits::WEIGHT_BITS;
-    in_range("weights.bits", parts.weight_bits, low, high)?;
-    in_range(
-        "weights.layers",
-        parts.layers.len() as u64,
-        1,
-        u64::from(limits::MAX_LAYERS),
-    )?;
-    let mut lanes = parts.shape.input_count();
-    for (index, layer) in parts.layers.iter().enumerate() {
-        check_layer(parts, index, layer, lanes)?;
-        lanes = u32::from(layer.outputs);
-    }
-    if lanes != u32::from(parts.shape.channel_count()) {
-        let last = parts.layers.len() - 1;
-        let channels = parts.shape.channel_count();
-        return Err(AssetError::field(
-            format!("weights.layer{last}.outputs"),
-            lanes,
-            format!("{channels}, the channels of the set"),
-        ));
-    }
-    Ok(())
-}
-
-fn check_layer(parts: &Parts, index: usize, layer: &Layer, lanes: u32) -> Result<(), AssetError> {
-    let field = |name: &str| format!("weights.layer{index}.{name}");
-    let is_last = index + 1 == parts.layers.len();
-    if u32::from(layer.inputs) != lanes {
-        return Err(AssetError::field(
-            field("inputs"),
-            layer.inputs,
-            format!("{lanes}, what the stage before it gives"),
-        ));
-    }
-    in_range(field("outputs"), layer.outputs, 1, limits::MAX_LANES)?;
-    let rows = usize::from(layer.outputs);
-    for (name, found, expected) in [
-        (
-            "weights",
-            layer.weights.len(),
-            rows * usize::from(layer.inputs),
-        ),
-        ("bias", layer.bias.len(), rows),
-        ("scales", layer.scales.len(), rows),
-    ] {
-        if found != expected {
-            return Err(AssetError::field(field(name), found, expected));
-        }
-    }
-    let largest = (1_i16 << (parts.weight_bits - 1)) - 1;
-    for &weight in &layer.weights {
-        in_range(field("weight"), i16::from(weight), -largest - 1, largest)?;
-    }
-    for &bias in &layer.bias {
-        in_range(
-            field("bias"),
-            bias,
-            1 - limits::BIAS_LIMIT,
-            limits::BIAS_LIMIT - 1,
-        )?;
-    }
-    if let Activation::Leaky { shift } = layer.activation {
-        in_range(field("leak_shift"), shift, 1, MAX_LEAK_SHIFT)?;
-    }
-    if is_last {
-        in_range(field("zero_point"), layer.zero_point, 0, 0)?;
-        if layer.activation != Activation::Identity {
-            let allowed = "identity, because it is the last layer";
-            return Err(AssetError::field(
-                field("activation"),
-                layer.activation.name(),
-                allowed,
-            ));
-        }
-        if layer.skip.is_some() {
-            return Err(AssetError::field(
-                field("skip"),
-                "a skip path",
-                "none in the last layer",
-            ));
-        }
-    } else {
-        in_range(field("zero_point"), layer.zero_point, -128, 127)?;
-    }
-    if let Some(skip) = layer.skip {
-        in_range(field("skip_span"), skip.span, 1, limits::MAX_SKIP_SPAN)?;
-        // The path starts at the output of the layer `span` before this one: never at the inputs
-        // of the synthesizer, which have another width and no scale of their own.
-        let source = index
-            .checked_sub(usize::from(skip.span))
-            .map(|i| parts.layers[i].outputs);
-        if source != Some(layer.outputs) {
-            let found = source.map_or("no such layer".to_owned(), |o| format!("{o} outputs"));
-            let allowed = format!("{} outputs, like the layer itself", layer.outputs);
-            return Err(AssetError::field(field("skip_source"), found, allowed));
-        }
-    }
-    Ok(())
 }
 
 fn check_metadata(parts: &Parts) -> Result<(), AssetError> {

@@ -11,7 +11,7 @@ use std::fmt;
 pub enum OperandKind {
     /// A grid, `g0` or `g1`.
     Grid,
-    /// A vector register of signed bytes, `v0`..`v3`.
+    /// A vector register of 16-bit lanes, integers or halves, `v0`..`v3`.
     Vector,
     /// A layer's parameters, `l0`..`l63`.
     Layer,
@@ -140,7 +140,7 @@ instructions! {
         /// The grid.
         grid: Grid [8..9],
     }
-    /// Unpack the fetched corners of a grid, interpolate them and write inputs, rounded once.
+    /// Unpack the fetched corners of a grid, interpolate them and write inputs, rounded as the profile says.
     Lerp = 0x04 "lerp" {
         /// Where the inputs go.
         dst: Vector [16..18],
@@ -165,7 +165,25 @@ instructions! {
         /// The lane written.
         lane: Immediate [32..42],
     }
-    /// Accumulators of a layer: bias, plus weights times vector, k ascending.
+    /// Write the saw waves of the texel, in the order of the triangle waves.
+    Saw = 0x07 "saw" {
+        /// Where the inputs go.
+        dst: Vector [16..18],
+        /// The first lane written.
+        lane: Immediate [32..42],
+        /// How many octaves.
+        octaves: Immediate [24..26],
+    }
+    /// Write zeros.
+    Zero = 0x08 "zero" {
+        /// Where the inputs go.
+        dst: Vector [16..18],
+        /// The first lane written.
+        lane: Immediate [32..42],
+        /// How many lanes.
+        lanes: Immediate [24..28],
+    }
+    /// Accumulators of an integer layer: bias, plus weights times vector, k ascending.
     Dense = 0x10 "dense" {
         /// The layer.
         layer: Layer [8..14],
@@ -195,7 +213,7 @@ instructions! {
         /// Accumulators.
         outputs: Immediate [48..59],
     }
-    /// Accumulators to activations: rescale, add the zero point, saturate to a signed byte.
+    /// Accumulators to activations: rescale, add the zero point, saturate to the layer's bits.
     Rescale = 0x14 "rescale" {
         /// The layer.
         layer: Layer [8..14],
@@ -222,8 +240,73 @@ instructions! {
         /// Channels.
         outputs: Immediate [48..59],
     }
+    /// Replace accumulators by entries of the layer's table; the next rescale only adds to them.
+    Table = 0x17 "table" {
+        /// The layer.
+        layer: Layer [8..14],
+        /// Accumulators.
+        outputs: Immediate [48..59],
+    }
     /// The texel is done.
     End = 0x1f "end" {
+    }
+    /// Sums of an fp16 layer in f32: bias, plus weights times vector read as halves.
+    DenseHalf = 0x20 "dense.half" {
+        /// The layer.
+        layer: Layer [8..14],
+        /// The vector multiplied.
+        src: Vector [16..18],
+        /// Lanes of the vector.
+        inputs: Immediate [32..43],
+        /// Sums made.
+        outputs: Immediate [48..59],
+    }
+    /// ReLU on the sums.
+    ReluHalf = 0x21 "relu.half" {
+        /// Sums.
+        outputs: Immediate [48..59],
+    }
+    /// Leaky ReLU on the sums, slope 2^−shift.
+    LeakyHalf = 0x22 "leaky.half" {
+        /// n of the slope 2^−n.
+        shift: Immediate [24..27],
+        /// Sums.
+        outputs: Immediate [48..59],
+    }
+    /// Hard GELU on the sums; of an argument limited to 3 if `clamped` is 1.
+    GateHalf = 0x23 "gate.half" {
+        /// Whether the argument is limited to 3.
+        clamped: Immediate [24..25],
+        /// Sums.
+        outputs: Immediate [48..59],
+    }
+    /// Add a vector of halves to the sums, in f32.
+    SkipHalf = 0x24 "skip.half" {
+        /// The skip path's source.
+        skip: Vector [18..20],
+        /// Sums.
+        outputs: Immediate [48..59],
+    }
+    /// Sums to halves: ties to even, saturated.
+    RoundHalf = 0x25 "round.half" {
+        /// Where the halves go.
+        dst: Vector [16..18],
+        /// Sums.
+        outputs: Immediate [48..59],
+    }
+    /// Sums to integers of the layer's bits, for an integer layer.
+    QuantizeHalf = 0x26 "quantize.half" {
+        /// The layer.
+        layer: Layer [8..14],
+        /// Where the integers go.
+        dst: Vector [16..18],
+        /// Sums.
+        outputs: Immediate [48..59],
+    }
+    /// Sums to channel codes: to each channel's format, and send.
+    EmitHalf = 0x27 "emit.half" {
+        /// Channels.
+        outputs: Immediate [48..59],
     }
 }
 

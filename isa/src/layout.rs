@@ -90,9 +90,10 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::embed::Wave;
     use crate::latent::LatentFormat;
     use crate::position::{AddressMode, CornerSnap};
-    use crate::shape::{GridShape, OutputFormat};
+    use crate::shape::{GridShape, OutputFormat, Sampling};
     use std::collections::BTreeSet;
 
     #[test]
@@ -101,12 +102,16 @@ mod tests {
             channels,
             format: LatentFormat::new(bits).unwrap(),
             scale_log2: 3,
+            sampling: Sampling::Corners,
         };
         let shape = Shape {
             width: 100,
             height: 52,
             mip_count: 1,
             octaves: 3,
+            wave: Wave::Triangle,
+            padding: 0,
+            input_bits: 8,
             snap: CornerSnap::Cell,
             address_mode: AddressMode::Wrap,
             grids: [grid(5, 3), grid(12, 4)],

@@ -5,6 +5,8 @@
 //! | module | answers |
 //! |---|---|
 //! | [`round`], [`rescale`] | how a number loses bits, and by whose rule |
+//! | [`accumulate`], [`half`] | how an integer and an fp16 layer sum |
+//! | [`filter`] | how a number between neighbours is made |
 //! | [`latent`] | what a stored code of a grid stands for |
 //! | [`position`] | which grid cells surround a texel of a mip, and how far in it lies |
 //! | [`embed`] | the integers that enter the synthesizer: latents, waves, level |
@@ -13,17 +15,25 @@
 //! | [`shape`], [`layer`], [`asset`] | one compressed texture set, validated |
 //! | [`format`](mod@format) | that asset as bytes: the `.ntx` file |
 //! | [`layout`] | where a unit's memory keeps the grids |
+//! | [`sampler`] | what a request by normalised coordinates means |
 //! | [`instruction`], [`assembly`], [`program`], [`link`] | the microprogram that decodes one texel |
 //!
 //! Three words never mix: a *code* is packed bits as stored, a *value* is the integer that a code
-//! stands for, a *real* is what the value means. Nothing in this crate computes with floats.
+//! stands for, a *real* is what the value means. Nothing in this crate computes with floats, except
+//! the sums of fp16 layers in [`half`].
 
+#![forbid(unsafe_code)]
+
+pub mod accumulate;
 pub mod activation;
 pub mod assembly;
 pub mod asset;
+mod check_layers;
 pub mod embed;
 pub mod error;
+pub mod filter;
 pub mod format;
+pub mod half;
 pub mod instruction;
 pub mod latent;
 pub mod layer;
@@ -35,6 +45,7 @@ pub mod profile;
 pub mod program;
 pub mod rescale;
 pub mod round;
+pub mod sampler;
 pub mod shape;
 
 pub use asset::Asset;

@@ -14,13 +14,17 @@ pub const LATENT_BITS: (u8, u8) = (1, 8);
 pub const WEIGHT_BITS: (u8, u8) = (2, 8);
 /// Lanes of a vector register: inputs or outputs of a layer.
 ///
-/// 1024 products of two 8-bit values stay below 2^24, so with a bias below 2^30 no accumulator
-/// can leave 31 bits: overflow is impossible, not merely undefined.
+/// 1024 products of an 8-bit weight and an 8-bit value stay below 2^24. Wider values, wide biases or
+/// narrower accumulators can overflow; the profile says what happens then.
 pub const MAX_LANES: u16 = 1024;
 /// Layers of a synthesizer.
 pub const MAX_LAYERS: u16 = 64;
-/// Magnitude of a bias, exclusive.
-pub const BIAS_LIMIT: i32 = 1 << 30;
+/// Bits of a lane that holds an integer: inputs and activations.
+pub const LANE_BITS: (u8, u8) = (4, 16);
+/// log2 of the integer that stands for the real 1, where an fp16 layer gives integers.
+pub const QUANTIZE_EXPONENT: (i8, i8) = (-16, 24);
+/// Zeros after the last input.
+pub const MAX_PADDING: u8 = 15;
 /// Layers that a skip path may span.
 pub const MAX_SKIP_SPAN: u8 = 3;
 /// Bytes of one string of the metadata, and how many entries there may be.

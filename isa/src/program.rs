@@ -2,9 +2,12 @@
 
 use crate::activation::Activation;
 use crate::asset::Asset;
+use crate::embed::Wave;
 use crate::instruction::{Instruction, VECTOR_COUNT};
+use crate::layer::{HalfParameters, Layer, Parameters};
 use crate::layout::Layout;
 use crate::link::{self, LinkError};
+use crate::shape::Sampling;
 
 /// A microprogram that is known to fit one asset: every operand is in range, nothing is read
 /// before it is written, and it ends.
@@ -23,52 +26,23 @@ impl Program {
         // never the one that a skip path still needs.
         let mut registers = vec![0_u16];
         for (index, layer) in asset.layers.iter().enumerate() {
-            let (id, outputs) = (index as u16, layer.outputs);
-            let src = registers[index];
-            instructions.push(Instruction::Dense {
-                layer: id,
-                src,
-                inputs: layer.inputs,
-                outputs,
-            });
-            match layer.activation {
-                Activation::Identity => {}
-                Activation::Relu => instructions.push(Instruction::Relu { outputs }),
-                Activation::Leaky { shift } => {
-                    instructions.push(Instruction::Leaky {
-                        shift: u16::from(shift),
-                        outputs,
-                    });
-                }
-                Activation::HardGelu { .. } => {
-                    instructions.push(Instruction::Gate { layer: id, outputs });
-                }
-            }
-            if index + 1 == asset.layers.len() {
-                instructions.push(Instruction::Emit { layer: id, outputs });
-                break;
-            }
             let live = live_sources(asset, index, &registers);
             let free = (0..VECTOR_COUNT).find(|register| !live.contains(register));
-            // A span is at most three layers, so at most three sources are live at once.
-            let dst = free.unwrap_or(src);
-            instructions.push(match layer.skip {
-                None => Instruction::Rescale {
-                    layer: id,
-                    dst,
-                    outputs,
-                },
-                Some(skip) => {
-                    let source = registers[index + 1 - usize::from(skip.span)];
-                    Instruction::RescaleSkip {
-                        layer: id,
-                        dst,
-                        skip: source,
-                        outputs,
-                    }
-                }
-            });
-            registers.push(dst);
+            let place = Place {
+                layer: index as u16,
+                src: registers[index],
+                // A span is at most three layers, so at most three sources are live at once.
+                dst: free.unwrap_or(registers[index]),
+                skip: layer
+                    .skip
+                    .map(|skip| registers[index + 1 - usize::from(skip.span)]),
+                is_last: index + 1 == asset.layers.len(),
+            };
+            match &layer.parameters {
+                Parameters::Integer(_) => integer_layer(layer, &place, &mut instructions),
+                Parameters::Half(half) => half_layer(layer, half, &place, &mut instructions),
+            }
+            registers.push(place.dst);
         }
         instructions.push(Instruction::End {});
         Program {
@@ -106,44 +80,136 @@ impl Program {
     }
 }
 
+/// Where a layer stands in the program.
+struct Place {
+    layer: u16,
+    src: u16,
+    dst: u16,
+    skip: Option<u16>,
+    is_last: bool,
+}
+
+fn integer_layer(layer: &Layer, place: &Place, instructions: &mut Vec<Instruction>) {
+    let Layer {
+        inputs, outputs, ..
+    } = *layer;
+    let id = place.layer;
+    instructions.push(Instruction::Dense {
+        layer: id,
+        src: place.src,
+        inputs,
+        outputs,
+    });
+    match layer.activation {
+        Activation::Identity => {}
+        Activation::Relu => instructions.push(Instruction::Relu { outputs }),
+        Activation::Leaky { shift } => instructions.push(Instruction::Leaky {
+            shift: u16::from(shift),
+            outputs,
+        }),
+        Activation::HardGelu { .. } => {
+            instructions.push(Instruction::Gate { layer: id, outputs });
+        }
+        Activation::Table => instructions.push(Instruction::Table { layer: id, outputs }),
+    }
+    let dst = place.dst;
+    instructions.push(match place.skip {
+        _ if place.is_last => Instruction::Emit { layer: id, outputs },
+        None => Instruction::Rescale {
+            layer: id,
+            dst,
+            outputs,
+        },
+        Some(skip) => Instruction::RescaleSkip {
+            layer: id,
+            dst,
+            skip,
+            outputs,
+        },
+    });
+}
+
+fn half_layer(
+    layer: &Layer,
+    parameters: &HalfParameters,
+    place: &Place,
+    instructions: &mut Vec<Instruction>,
+) {
+    let Layer {
+        inputs, outputs, ..
+    } = *layer;
+    instructions.push(Instruction::DenseHalf {
+        layer: place.layer,
+        src: place.src,
+        inputs,
+        outputs,
+    });
+    match layer.activation {
+        // A validated fp16 layer has no table.
+        Activation::Identity | Activation::Table => {}
+        Activation::Relu => instructions.push(Instruction::ReluHalf { outputs }),
+        Activation::Leaky { shift } => instructions.push(Instruction::LeakyHalf {
+            shift: u16::from(shift),
+            outputs,
+        }),
+        Activation::HardGelu { is_clamped, .. } => instructions.push(Instruction::GateHalf {
+            clamped: u16::from(is_clamped),
+            outputs,
+        }),
+    }
+    if let Some(skip) = place.skip {
+        instructions.push(Instruction::SkipHalf { skip, outputs });
+    }
+    instructions.push(match parameters.quantize {
+        _ if place.is_last => Instruction::EmitHalf { outputs },
+        None => Instruction::RoundHalf {
+            dst: place.dst,
+            outputs,
+        },
+        Some(_) => Instruction::QuantizeHalf {
+            layer: place.layer,
+            dst: place.dst,
+            outputs,
+        },
+    });
+}
+
 /// The instructions that write the synthesizer's inputs to v0.
 fn embed(asset: &Asset) -> Vec<Instruction> {
     let shape = &asset.shape;
-    let [first, second] = [0, 1].map(|g: usize| shape.grids[g].channels);
-    let mut lane = 0;
+    let mut instructions = Vec::new();
+    for grid in [0, 1] {
+        instructions.push(Instruction::Position { grid });
+        instructions.push(Instruction::Fetch { grid });
+    }
+    let dst = 0;
+    let mut next = 0;
     let mut take = |lanes: u16| {
-        let start = lane;
-        lane += lanes;
-        start
+        let lane = next;
+        next += lanes;
+        lane
     };
-    let mut instructions = vec![
-        Instruction::Position { grid: 0 },
-        Instruction::Fetch { grid: 0 },
-        Instruction::Position { grid: 1 },
-        Instruction::Fetch { grid: 1 },
-        Instruction::Concat {
-            dst: 0,
-            lane: take(4 * first),
-            grid: 0,
-        },
-        Instruction::Lerp {
-            dst: 0,
-            lane: take(second),
-            grid: 1,
-        },
-    ];
-    if shape.octaves > 0 {
-        let octaves = u16::from(shape.octaves);
-        instructions.push(Instruction::Wave {
-            dst: 0,
-            lane: take(shape.wave_count()),
-            octaves,
+    for (grid, sizes) in (0..).zip(&shape.grids) {
+        let lane = take(sizes.input_count());
+        instructions.push(match sizes.sampling {
+            Sampling::Corners => Instruction::Concat { dst, lane, grid },
+            Sampling::Interpolated => Instruction::Lerp { dst, lane, grid },
         });
     }
-    instructions.push(Instruction::Level {
-        dst: 0,
-        lane: take(1),
-    });
+    if shape.octaves > 0 {
+        let octaves = u16::from(shape.octaves);
+        let lane = take(shape.wave_count());
+        instructions.push(match shape.wave {
+            Wave::Triangle => Instruction::Wave { dst, lane, octaves },
+            Wave::Saw => Instruction::Saw { dst, lane, octaves },
+        });
+    }
+    instructions.push(Instruction::Level { dst, lane: take(1) });
+    if shape.padding > 0 {
+        let lanes = u16::from(shape.padding);
+        let lane = take(lanes);
+        instructions.push(Instruction::Zero { dst, lane, lanes });
+    }
     instructions
 }
 

@@ -136,7 +136,10 @@ impl Multiplier {
 }
 
 /// The arithmetic of one requantiser.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
 pub enum Requantizer {
     /// One rounding of the full product, ties up. TOSA `RESCALE` `SINGLE_ROUND`. Normative.
     Single,
@@ -269,7 +272,89 @@ mod tests {
         assert!(Multiplier::nearest(1, -80).is_err());
     }
 
+    /// The requantisers by their published definitions: quotients and remainders in 128 bits.
+    fn by_definition(requantizer: Requantizer, value: i32, scale: Multiplier) -> i128 {
+        let (mantissa, shift) = (i128::from(scale.mantissa()), u32::from(scale.shift()));
+        let product = i128::from(value) * mantissa;
+        let half_up = |numerator: i128, unit: i128| (2 * numerator + unit).div_euclid(2 * unit);
+        let away =
+            |numerator: i128, unit: i128| numerator.signum() * half_up(numerator.abs(), unit);
+        let unit = 1_i128 << shift;
+        match requantizer {
+            Requantizer::Single => half_up(product, unit),
+            Requantizer::HalfAway => away(product, unit),
+            Requantizer::HalfEven => {
+                let up = half_up(product, unit);
+                let is_tie = (2 * product).rem_euclid(2 * unit) == unit;
+                if is_tie && up % 2 != 0 { up - 1 } else { up }
+            }
+            Requantizer::Double if shift > 31 => {
+                // gemmlowp: SaturatingRoundingDoublingHighMul, whose division truncates after a nudge
+                // of the product's sign, then RoundingDivideByPOT, ties away from zero.
+                let nudge = if product >= 0 { 1 << 30 } else { 1 - (1 << 30) };
+                let high = (product + nudge) / (1 << 31);
+                away(high, 1 << (shift - 31))
+            }
+            Requantizer::Double => half_up(product, unit),
+            Requantizer::Narrow => {
+                let upper = half_up(mantissa, 1 << 16).min(32_767);
+                let narrow = i128::from(value) * upper;
+                if shift > 16 {
+                    half_up(narrow, 1 << (shift - 16))
+                } else {
+                    narrow << (16 - shift)
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_requantizer_is_its_definition_on_all_sixteen_bit_accumulators() {
+        // Ties at many values, both ends of the mantissa and of the shift, where double rounding
+        // begins, and the published case.
+        let scales = [
+            (1 << 30, 2),
+            (1 << 30, 30),
+            (1 << 30, 31),
+            (1 << 30, 32),
+            (1 << 30, 38),
+            (3 << 29, 33),
+            (5 << 28, 36),
+            (0x6000_8000, 40),
+            (i32::MAX, 2),
+            (i32::MAX, 31),
+            (i32::MAX, 47),
+            (i32::MAX, 62),
+            (1 << 30, 62),
+            (1_583_594_044, 40),
+        ];
+        for (mantissa, shift) in scales {
+            let scale = Multiplier::new(mantissa, shift).unwrap();
+            for requantizer in Requantizer::ALL {
+                for value in i32::from(i16::MIN)..=i32::from(i16::MAX) {
+                    let exact = by_definition(requantizer, value, scale);
+                    let saturated = exact.clamp(i128::from(i32::MIN), i128::from(i32::MAX));
+                    assert_eq!(
+                        i128::from(requantizer.apply(value, scale)),
+                        saturated,
+                        "{} of {value} by {mantissa} / 2^{shift}",
+                        requantizer.name()
+                    );
+                }
+            }
+        }
+    }
+
     proptest! {
+        #[test]
+        fn every_requantizer_is_its_definition(value: i32, scale in multiplier()) {
+            for requantizer in Requantizer::ALL {
+                let exact = by_definition(requantizer, value, scale);
+                let saturated = exact.clamp(i128::from(i32::MIN), i128::from(i32::MAX));
+                prop_assert_eq!(i128::from(requantizer.apply(value, scale)), saturated);
+            }
+        }
+
         #[test]
         fn single_is_the_nearest_integer_in_exact_arithmetic(value: i32, scale in multiplier()) {
             let product = i128::from(value) * i128::from(scale.mantissa());

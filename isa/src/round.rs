@@ -4,7 +4,10 @@
 ///
 /// Real meaning of every mode: `q = value / 2^shift`, then to the nearest integer, with ties as the
 /// name says; [`Rounding::Floor`] has no ties.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
 pub enum Rounding {
     /// Ties towards +∞: `(value + half) >> shift`. TOSA's `SINGLE_ROUND`.
     HalfUp,

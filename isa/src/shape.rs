@@ -1,6 +1,6 @@
 //! Shape: the sizes of a compressed texture set, and how its grids are sampled.
 
-use crate::embed::WAVES_PER_OCTAVE;
+use crate::embed::{WAVES_PER_OCTAVE, Wave};
 use crate::latent::LatentFormat;
 use crate::position::{AddressMode, CornerSnap};
 
@@ -13,14 +13,17 @@ pub enum OutputFormat {
     Unorm16,
     /// −127..=127, real = code / 127.
     Snorm8,
+    /// The bits of an IEEE 754 binary16 number, 0..=65535; finite.
+    Float16,
 }
 
 impl OutputFormat {
     /// Every format, in the order of its code in a file.
-    pub const ALL: [OutputFormat; 3] = [
+    pub const ALL: [OutputFormat; 4] = [
         OutputFormat::Unorm8,
         OutputFormat::Unorm16,
         OutputFormat::Snorm8,
+        OutputFormat::Float16,
     ];
 
     /// The name in tables, assembly and JSON.
@@ -30,6 +33,7 @@ impl OutputFormat {
             OutputFormat::Unorm8 => "unorm8",
             OutputFormat::Unorm16 => "unorm16",
             OutputFormat::Snorm8 => "snorm8",
+            OutputFormat::Float16 => "float16",
         }
     }
 
@@ -38,7 +42,7 @@ impl OutputFormat {
     pub const fn range(self) -> (i32, i32) {
         match self {
             OutputFormat::Unorm8 => (0, 255),
-            OutputFormat::Unorm16 => (0, 65_535),
+            OutputFormat::Unorm16 | OutputFormat::Float16 => (0, 65_535),
             OutputFormat::Snorm8 => (-127, 127),
         }
     }
@@ -56,6 +60,55 @@ impl OutputFormat {
     }
 }
 
+/// What a grid gives the synthesizer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Sampling {
+    /// The four corners one after the other; the synthesizer learns to interpolate them.
+    Corners,
+    /// One latent a channel, interpolated among the four corners.
+    Interpolated,
+}
+
+impl Sampling {
+    /// Every choice, in the order of its code in a file.
+    pub const ALL: [Sampling; 2] = [Sampling::Corners, Sampling::Interpolated];
+
+    /// The name in tables and JSON.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Sampling::Corners => "corners",
+            Sampling::Interpolated => "interpolated",
+        }
+    }
+
+    /// The code in a file.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The choice with this code, if there is one.
+    #[must_use]
+    pub fn from_code(code: u8) -> Option<Sampling> {
+        Sampling::ALL.get(usize::from(code)).copied()
+    }
+}
+
+/// What the lanes of a vector register hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LaneFormat {
+    /// Signed integers of this many bits, 4..=16, about a zero point.
+    Integer {
+        /// Bits of a value.
+        bits: u8,
+        /// The value that stands for the real zero.
+        zero_point: i16,
+    },
+    /// The bits of IEEE 754 binary16 numbers.
+    Half,
+}
+
 /// The sizes of one grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct GridShape {
@@ -65,9 +118,20 @@ pub struct GridShape {
     pub format: LatentFormat,
     /// log2 of mip 0's resolution over the grid's: 3 for the paper's 1/8.
     pub scale_log2: u8,
+    /// See [`Sampling`].
+    pub sampling: Sampling,
 }
 
 impl GridShape {
+    /// Inputs that the grid gives.
+    #[must_use]
+    pub const fn input_count(self) -> u16 {
+        match self.sampling {
+            Sampling::Corners => 4 * self.channels,
+            Sampling::Interpolated => self.channels,
+        }
+    }
+
     /// Cells along an axis of `texels` texels: the quotient, rounded up.
     #[must_use]
     pub const fn cells(self, texels: u32) -> u32 {
@@ -86,11 +150,17 @@ pub struct Shape {
     pub mip_count: u8,
     /// Octaves of the waves.
     pub octaves: u8,
+    /// The form of the waves.
+    pub wave: Wave,
+    /// Zeros after the level.
+    pub padding: u8,
+    /// Bits of an input, 4..=16: real = value / 2^(bits − 1).
+    pub input_bits: u8,
     /// See [`CornerSnap`].
     pub snap: CornerSnap,
     /// See [`AddressMode`]; for both axes and grids.
     pub address_mode: AddressMode,
-    /// Grid 0, whose corners are concatenated, and grid 1, which is interpolated.
+    /// Grid 0 and grid 1; in CNTC the corners of grid 0 are concatenated and grid 1 is interpolated.
     pub grids: [GridShape; 2],
     /// One output format for each channel.
     pub outputs: Vec<OutputFormat>,
@@ -126,13 +196,23 @@ impl Shape {
         w as u64 * h as u64 * self.grids[grid].channels as u64
     }
 
-    /// Inputs of the synthesizer: 4·c0 + c1 + waves + the level.
+    /// Inputs of the synthesizer: those of both grids, the waves, the level, the padding.
     #[must_use]
     pub const fn input_count(&self) -> u32 {
-        4 * self.grids[0].channels as u32
-            + self.grids[1].channels as u32
+        self.grids[0].input_count() as u32
+            + self.grids[1].input_count() as u32
             + self.wave_count() as u32
             + 1
+            + self.padding as u32
+    }
+
+    /// What the register of the inputs holds.
+    #[must_use]
+    pub const fn input_format(&self) -> LaneFormat {
+        LaneFormat::Integer {
+            bits: self.input_bits,
+            zero_point: 0,
+        }
     }
 
     /// Waves among the inputs.

@@ -1,25 +1,55 @@
 //! Checks of the shader text that need no device.
 
 use crate::pack::header_words;
-use crate::source::{NO_TAPS, STAGES, Sizes, Stage, TAPS};
+use crate::source::{HALF_STAGES, NO_HALF, NO_TAPS, STAGES, Stage, TAPS, source};
+use crate::variant::Variant;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use naga::{Module, ScalarKind, TypeInner};
+use ntmu_isa::profile::NamedProfile;
+use ntmu_isa::shape::Sampling;
 use std::collections::BTreeSet;
 
-/// Every text that a device may be given, at the smallest and the largest sizes.
+/// Texts that a device may be given: at the smallest and the largest sizes, with each kind of layer
+/// alone, and by every named profile.
 fn texts() -> Vec<(String, String)> {
-    let smallest = Sizes {
-        vector_steps: 1,
+    let largest = Variant::largest();
+    let smallest = Variant {
+        vector_elements: 1,
         vector_count: 2,
-        ..Sizes::largest()
+        has_words: false,
+        has_half_layers: false,
+        has_float_output: false,
+        activations: 1,
+        samplings: [Sampling::Interpolated; 2],
+        input_bits: 4,
+        ..largest
     };
-    [("smallest", smallest), ("largest", Sizes::largest())]
-        .into_iter()
-        .flat_map(|(name, sizes)| {
-            [false, true].map(|taps| (format!("{name}, taps {taps}"), sizes.source(taps)))
-        })
-        .chain([("probe".to_owned(), crate::probe::source())])
-        .collect()
+    let halves = Variant {
+        has_bytes: false,
+        has_integer_layers: false,
+        input_bits: 16,
+        ..largest
+    };
+    let profiles = NamedProfile::all().unwrap().into_iter().map(|named| {
+        let variant = Variant {
+            profile: named.profile,
+            ..largest
+        };
+        (named.name, variant)
+    });
+    [
+        ("smallest", smallest),
+        ("largest", largest),
+        ("halves", halves),
+    ]
+    .map(|(name, variant)| (name.to_owned(), variant))
+    .into_iter()
+    .chain(profiles)
+    .flat_map(|(name, variant)| {
+        [false, true].map(|taps| (format!("{name}, taps {taps}"), source(&variant, taps)))
+    })
+    .chain([("probe".to_owned(), crate::probe::text())])
+    .collect()
 }
 
 fn parse(name: &str, text: &str) -> Module {
@@ -109,7 +139,7 @@ fn defined(stage: &Stage) -> BTreeSet<&str> {
 
 #[test]
 fn every_stage_defines_its_functions_and_every_function_is_in_one_file() {
-    let module = parse("decode", &Sizes::largest().source(false));
+    let module = parse("decode", &source(&Variant::largest(), false));
     let mut in_module: BTreeSet<&str> = module
         .functions
         .iter()
@@ -117,7 +147,7 @@ fn every_stage_defines_its_functions_and_every_function_is_in_one_file() {
         .collect();
     in_module.extend(module.entry_points.iter().map(|entry| entry.name.as_str()));
     let mut seen = BTreeSet::new();
-    for stage in STAGES.iter().chain([&NO_TAPS]) {
+    for stage in STAGES.iter().chain(HALF_STAGES).chain([&NO_TAPS]) {
         let defined = defined(stage);
         for function in stage.functions {
             assert!(defined.contains(function), "{}: {function}", stage.stem);
@@ -128,6 +158,10 @@ fn every_stage_defines_its_functions_and_every_function_is_in_one_file() {
     }
     assert_eq!(seen, in_module);
     assert_eq!(defined(&TAPS), defined(&NO_TAPS));
+    let entered: BTreeSet<&str> = NO_HALF.functions.iter().copied().collect();
+    assert_eq!(defined(&NO_HALF), entered);
+    let functions = HALF_STAGES.iter().flat_map(|stage| stage.functions);
+    assert!(entered.is_subset(&functions.copied().collect()));
 }
 
 #[test]
@@ -139,8 +173,9 @@ fn every_file_of_the_folder_is_a_stage() {
         .collect();
     let listed: BTreeSet<String> = STAGES
         .iter()
+        .chain(HALF_STAGES)
         .map(|stage| stage.stem)
-        .chain([TAPS.stem, NO_TAPS.stem, "probe"])
+        .chain([NO_HALF.stem, TAPS.stem, NO_TAPS.stem, "probe", "probe_half"])
         .map(|stem| format!("{stem}.wgsl"))
         .collect();
     assert_eq!(found, listed);
@@ -164,8 +199,8 @@ fn members(module: &Module, name: &str) -> Vec<(String, u32)> {
 
 #[test]
 fn buffers_have_no_gaps_that_the_host_would_have_to_know() {
-    let module = parse("decode", &Sizes::largest().source(true));
-    for name in ["Request", "Grid", "Layer", "Row"] {
+    let module = parse("decode", &source(&Variant::largest(), true));
+    for name in ["Request", "Grid", "Layer", "Row", "Part"] {
         for (index, (field, offset)) in (0..).zip(members(&module, name)) {
             assert_eq!(offset, 4 * index, "{name}.{field}");
         }

@@ -3,13 +3,16 @@
 //! `wgsl/` holds one file a stage, with the stems of the model's stages; the functions have the
 //! specification's names. The shaders know the specification's numbers ([`spec`]) and share no
 //! arithmetic with the model, so that two implementations agreeing means something. They compute
-//! with integers only: WGSL leaves too much of its floats open.
+//! with integers only: WGSL leaves too much of its floats open, so the binary32 sums of fp16 layers
+//! are computed on their bits.
 //!
 //! | module | answers |
 //! |---|---|
 //! | [`spec`] | which numbers the shaders take from the specification |
+//! | [`variant`] | what the shader must know of an asset before it is compiled |
 //! | [`source`] | which files there are, and what text is compiled for an asset |
 //! | `pack` | what the buffers hold |
+//! | `part` | what each pass runs |
 //! | [`gpu`] | which device, and how work reaches it |
 //! | [`twin`] | one asset on one device: mips, texels, taps |
 //! | [`taps`] | every intermediate value of one texel |
@@ -22,13 +25,17 @@
 //! # }
 //! ```
 
+#![forbid(unsafe_code)]
+
 pub mod error;
 pub mod gpu;
 mod pack;
+mod part;
 pub mod source;
 pub mod spec;
 pub mod taps;
 pub mod twin;
+pub mod variant;
 
 #[cfg(test)]
 mod check;

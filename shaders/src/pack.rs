@@ -1,17 +1,18 @@
 //! Pack: an asset as the buffers that `wgsl/bindings.wgsl` declares.
 
-use crate::source::STEP_LANES;
-use crate::spec::activation_code;
+use crate::part::QUAD;
 use crate::taps::TapLayout;
+use crate::variant::{Arithmetic, Lanes};
 use ntmu_isa::Asset;
 use ntmu_isa::activation::Activation;
-use ntmu_isa::layer::Layer;
+use ntmu_isa::layer::{Layer, Parameters};
 use ntmu_isa::layout::Layout;
 use ntmu_isa::limits::{MAX_CHANNELS, MAX_LAYERS};
 use ntmu_isa::rescale::Multiplier;
+use ntmu_isa::shape::LaneFormat;
 
-/// Rows that the shader computes together.
-const QUAD: usize = 4;
+/// Bytes of one element of the weights.
+const ELEMENT: usize = 16;
 
 /// Bias, mantissa and shift of one row.
 pub(crate) type Row = [u32; 3];
@@ -24,7 +25,7 @@ pub(crate) struct Packed {
     pub(crate) grids: [Vec<u8>; 2],
     /// Every layer's rows, each layer padded to a multiple of four.
     pub(crate) rows: Vec<Row>,
-    /// Every layer's weights, padded with zeros to whole steps and quads.
+    /// Every layer's weights, padded with zeros to whole steps and quads; then its table.
     pub(crate) weights: Vec<u8>,
 }
 
@@ -41,6 +42,7 @@ impl Packed {
             packed.header.extend(words);
             packed.rows(layer);
             packed.weights(layer);
+            packed.table(layer);
         }
         packed.header.resize(header_words(), 0);
         packed
@@ -48,64 +50,122 @@ impl Packed {
 
     /// `Layer`, word by word; its rows and weights come next in their buffers.
     fn layer(&self, asset: &Asset, index: usize, layer: &Layer, tap: u32) -> [u32; LAYER_WORDS] {
+        let arithmetic = Arithmetic::of(layer);
+        let steps = steps(layer);
+        let quads = u32::from(layer.outputs).div_ceil(QUAD);
+        let weight = (self.weights.len() / ELEMENT) as u32;
         let (leak_shift, gate) = match layer.activation {
-            Activation::Identity | Activation::Relu => (0, None),
+            Activation::Identity | Activation::Relu | Activation::Table => (0, None),
             Activation::Leaky { shift } => (u32::from(shift), None),
-            Activation::HardGelu { scale } => (0, Some(scale)),
+            Activation::HardGelu { scale, .. } => (0, Some(scale)),
         };
-        let skip = layer.skip.map(|skip| {
-            let source = &asset.layers[index - usize::from(skip.span)];
-            (u32::from(skip.span), skip.scale, source.zero_point)
-        });
+        let quantize_exponent = layer.half().and_then(|half| half.quantize);
         let [gate_mantissa, gate_shift] = multiplier(gate);
-        let [skip_mantissa, skip_shift] = multiplier(skip.map(|(_, scale, _)| scale));
+        let [input_lanes, input_bits, input_zero_point] = lanes(asset.input_format(index));
+        let [output_lanes, output_bits, zero_point] = lanes(layer.output_format());
+        let source = asset.skip_source(index).map(|at| &asset.layers[at]);
+        let [skip_lanes, _, skip_zero_point] =
+            source.map_or([0; 3], |source| lanes(source.output_format()));
+        let [skip_mantissa, skip_shift] = multiplier(layer.skip.map(|skip| skip.scale));
         [
-            u32::from(layer.inputs).div_ceil(STEP_LANES),
+            u32::from(layer.inputs),
             u32::from(layer.outputs),
+            arithmetic.code(),
+            steps,
             self.rows.len() as u32,
-            (self.weights.len() / STEP_LANES as usize) as u32,
-            activation_code(&layer.activation),
+            weight,
+            weight + quads * QUAD * steps,
+            tap,
+            input_lanes,
+            input_bits,
+            input_zero_point,
+            u32::from(layer.activation.code()),
             leak_shift,
             gate_mantissa,
             gate_shift,
-            i32::from(layer.zero_point) as u32,
-            skip.map_or(0, |(span, _, _)| span),
+            output_lanes,
+            output_bits,
+            zero_point,
+            quantize_exponent.map_or(0, |q| i32::from(q.exponent) as u32),
+            layer.skip.map_or(0, |skip| u32::from(skip.span)),
+            skip_lanes,
+            skip_zero_point,
             skip_mantissa,
             skip_shift,
-            skip.map_or(0, |(_, _, zero_point)| i32::from(zero_point)) as u32,
-            tap,
-            0,
-            0,
         ]
     }
 
     fn rows(&mut self, layer: &Layer) {
-        for (bias, &scale) in layer.bias.iter().zip(&layer.scales) {
-            let [mantissa, shift] = multiplier(Some(scale));
-            self.rows.push([*bias as u32, mantissa, shift]);
+        match &layer.parameters {
+            Parameters::Integer(integer) => {
+                let rows = integer.bias.iter().zip(&integer.scales);
+                self.rows.extend(rows.map(|(&bias, &scale)| {
+                    let [mantissa, shift] = multiplier(Some(scale));
+                    [bias as u32, mantissa, shift]
+                }));
+            }
+            Parameters::Half(half) => self.rows.extend(half.bias.iter().map(|bias| {
+                let [mantissa, shift] = multiplier(None);
+                [u32::from(bias.bits()), mantissa, shift]
+            })),
         }
         let [mantissa, shift] = multiplier(None);
-        let padded = self.rows.len().next_multiple_of(QUAD);
+        let padded = self.rows.len().next_multiple_of(QUAD as usize);
         self.rows.resize(padded, [0, mantissa, shift]);
     }
 
     fn weights(&mut self, layer: &Layer) {
-        let step = STEP_LANES as usize;
-        let steps = usize::from(layer.inputs).div_ceil(step);
-        let rows = usize::from(layer.outputs).next_multiple_of(QUAD);
+        let quad = QUAD as usize;
+        let steps = steps(layer) as usize;
+        let rows = usize::from(layer.outputs).next_multiple_of(quad);
         let start = self.weights.len();
-        self.weights.resize(start + rows * steps * step, 0);
+        self.weights.resize(start + rows * steps * ELEMENT, 0);
         for row in 0..usize::from(layer.outputs) {
-            for (k, &weight) in layer.row(row).iter().enumerate() {
-                let element = (row / QUAD * steps + k / step) * QUAD + row % QUAD;
-                self.weights[start + element * step + k % step] = weight as u8;
+            let bytes: Vec<u8> = match &layer.parameters {
+                Parameters::Integer(integer) => {
+                    let weights = integer.row(row, layer.inputs).iter();
+                    weights.map(|&weight| weight as u8).collect()
+                }
+                Parameters::Half(half) => {
+                    let weights = half.row(row, layer.inputs).iter();
+                    weights.flat_map(|w| w.bits().to_le_bytes()).collect()
+                }
+            };
+            for (step, chunk) in bytes.chunks(ELEMENT).enumerate() {
+                let element = (row / quad * steps + step) * quad + row % quad;
+                let at = start + element * ELEMENT;
+                self.weights[at..at + chunk.len()].copy_from_slice(chunk);
             }
         }
     }
+
+    fn table(&mut self, layer: &Layer) {
+        let entries = layer.integer().map_or(&[][..], |integer| &integer.table);
+        self.weights
+            .extend(entries.iter().flat_map(|entry| entry.to_le_bytes()));
+    }
+}
+
+/// Elements of a row's weights.
+fn steps(layer: &Layer) -> u32 {
+    u32::from(layer.inputs).div_ceil(Arithmetic::of(layer).weights_per_element())
+}
+
+/// Lanes, bits and zero point of a register; of halves the first only.
+fn lanes(format: LaneFormat) -> [u32; 3] {
+    let (bits, zero_point) = match format {
+        LaneFormat::Integer { bits, zero_point } => (bits, zero_point),
+        LaneFormat::Half => (16, 0),
+    };
+    [
+        Lanes::of(format).code(),
+        u32::from(bits),
+        i32::from(zero_point) as u32,
+    ]
 }
 
 /// Words of `Layer`.
-const LAYER_WORDS: usize = 16;
+const LAYER_WORDS: usize = 24;
 /// Words of `Header` before its grids.
 const HEAD_WORDS: usize = 12;
 /// Words of `Grid`.
@@ -129,8 +189,8 @@ fn header(asset: &Asset, taps: &TapLayout) -> Vec<u32> {
         taps.inputs.start,
         taps.codes.start,
         taps.words,
-        0,
-        0,
+        u32::from(shape.wave.code()),
+        u32::from(shape.padding),
         0,
     ];
     for (index, grid) in shape.grids.iter().enumerate() {

@@ -1,16 +1,9 @@
-//! Source: the shader text, and how it is put together for one asset.
-//!
-//! The kernels are never rewritten. What varies with the asset is data in buffers, except for the
-//! few numbers that WGSL wants before it compiles: [`Sizes`], a header of constants.
+//! Source: the shader files, and how they are put together for one asset.
 
-use ntmu_isa::profile::Profile;
-use ntmu_isa::{Asset, limits};
+use crate::variant::Variant;
 
 /// Invocations of one workgroup: a multiple of every common subgroup size.
 pub const WORKGROUP: u32 = 64;
-
-/// Lanes in one element of a vector in the shader: sixteen signed bytes.
-pub const STEP_LANES: u32 = 16;
 
 /// Words of one grid's taps before the codes: two axes of first, stride and phase; columns; rows.
 pub(crate) const TAP_CORNER_WORDS: u32 = 10;
@@ -36,7 +29,8 @@ macro_rules! stage {
     };
 }
 
-/// Every file of the decode, in the order of the texel's journey; the first four carry the rest.
+/// The files of every decode, in the order of the texel's journey; those up to `accumulate` carry the
+/// rest.
 pub const STAGES: &[Stage] = &[
     stage!("spec", []),
     stage!("bindings", []),
@@ -47,6 +41,7 @@ pub const STAGES: &[Stage] = &[
     ),
     stage!("round", ["rounding_shift", "rounding_shift_wide"]),
     stage!("rescale", ["requantizer_apply"]),
+    stage!("accumulate", ["signed_range", "accumulator_add"]),
     stage!(
         "position",
         [
@@ -58,24 +53,58 @@ pub const STAGES: &[Stage] = &[
     ),
     stage!("fetch", ["fetch"]),
     stage!("unpack", ["unpack", "latent_value"]),
-    stage!("interpolate", ["corner_weights", "lerp"]),
+    stage!("interpolate", ["corner_weights", "lerp_input", "lerp"]),
     stage!(
         "embed",
         [
             "corner_input",
-            "lerp_input",
             "wave_input",
             "level_input",
-            "concat",
+            "sample",
             "waves",
             "level",
+            "padding",
         ]
     ),
-    stage!("layer", ["dense", "rescale", "skip_term", "run_layer"]),
-    stage!("activation", ["leak", "gate", "gate_argument", "activate"]),
-    stage!("output", ["output_range", "emit"]),
+    stage!("dense", ["dense"]),
+    stage!("layer", ["rescale", "skip_term", "run_layer"]),
+    stage!(
+        "activation",
+        ["leak", "gate", "gate_argument", "table_index", "activate",]
+    ),
+    stage!("output", ["output_code", "emit"]),
     stage!("decode", ["decode"]),
 ];
+
+/// Linked in where an asset has fp16 layers or float16 channels.
+pub const HALF_STAGES: &[Stage] = &[
+    stage!("float", ["float_add", "float_multiply", "float_to_integer"]),
+    stage!(
+        "half",
+        [
+            "half_product",
+            "half_to_float",
+            "half_round",
+            "half_from_fixed",
+            "half_fused",
+        ]
+    ),
+    stage!(
+        "half_layer",
+        ["dense_half", "finish_half", "output_code_half"]
+    ),
+];
+
+/// Linked in where it has none.
+pub const NO_HALF: Stage = stage!(
+    "no_half",
+    [
+        "half_from_fixed",
+        "dense_half",
+        "finish_half",
+        "output_code_half"
+    ]
+);
 
 /// Linked in where taps are asked for.
 pub const TAPS: Stage = stage!("taps", ["tap_texel", "tap"]);
@@ -83,85 +112,19 @@ pub const TAPS: Stage = stage!("taps", ["tap_texel", "tap"]);
 /// Linked in where they are not.
 pub const NO_TAPS: Stage = stage!("no_taps", ["tap_texel", "tap"]);
 
-/// What the shader must know of an asset before it is compiled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Sizes {
-    /// Elements of [`STEP_LANES`] lanes that the widest vector needs.
-    pub vector_steps: u32,
-    /// Vectors that are live at once.
-    pub vector_count: u32,
-    /// The rounding points. Constants, because a software adapter runs every case of a `switch`
-    /// whose selector it only learns later.
-    pub profile: Profile,
-}
-
-impl Sizes {
-    /// The sizes of an asset.
-    #[must_use]
-    pub fn of(asset: &Asset) -> Sizes {
-        let hidden = &asset.layers[..asset.layers.len() - 1];
-        let widest = hidden
-            .iter()
-            .map(|layer| u32::from(layer.outputs))
-            .fold(asset.shape.input_count(), u32::max);
-        let longest_span = asset
-            .layers
-            .iter()
-            .filter_map(|layer| layer.skip)
-            .map(|skip| u32::from(skip.span))
-            .fold(0, u32::max);
-        Sizes {
-            vector_steps: widest.div_ceil(STEP_LANES),
-            // A layer's output, its input, and what is older up to the source of its skip path.
-            vector_count: (longest_span + 1).max(2),
-            profile: asset.profile,
-        }
+/// The whole text of the decode for these constants.
+#[must_use]
+pub fn source(variant: &Variant, with_taps: bool) -> String {
+    let taps = if with_taps { TAPS } else { NO_TAPS };
+    let halves = if variant.has_half_layers || variant.has_float_output {
+        HALF_STAGES
+    } else {
+        &[NO_HALF]
+    };
+    let mut text = variant.header();
+    for stage in STAGES.iter().chain(halves).chain([&taps]) {
+        text.push('\n');
+        text.push_str(stage.text);
     }
-
-    /// The largest sizes that any asset has.
-    #[must_use]
-    pub fn largest() -> Sizes {
-        Sizes {
-            vector_steps: u32::from(limits::MAX_LANES).div_ceil(STEP_LANES),
-            vector_count: u32::from(limits::MAX_SKIP_SPAN) + 1,
-            profile: Profile::NORMATIVE,
-        }
-    }
-
-    /// Elements of one texel's vectors, 16 bytes each.
-    #[must_use]
-    pub const fn vector_elements(&self) -> u32 {
-        self.vector_steps * self.vector_count
-    }
-
-    /// The sizes as WGSL constants.
-    #[must_use]
-    pub fn header(&self) -> String {
-        let profile = &self.profile;
-        [
-            ("WORKGROUP", WORKGROUP),
-            ("TAP_CORNER_WORDS", TAP_CORNER_WORDS),
-            ("VECTOR_STEPS", self.vector_steps),
-            ("VECTOR_COUNT", self.vector_count),
-            ("PROFILE_INPUT", u32::from(profile.input.code())),
-            ("PROFILE_LEAK", u32::from(profile.leak.code())),
-            ("PROFILE_REQUANTIZE", u32::from(profile.requantize.code())),
-            ("PROFILE_SKIP", u32::from(profile.skip.code())),
-            ("PROFILE_OUTPUT", u32::from(profile.output.code())),
-        ]
-        .map(|(name, value)| format!("const {name}: u32 = {value}u;\n"))
-        .concat()
-    }
-
-    /// The whole text of the decode for these sizes.
-    #[must_use]
-    pub fn source(&self, with_taps: bool) -> String {
-        let taps = if with_taps { TAPS } else { NO_TAPS };
-        let mut text = self.header();
-        for stage in STAGES.iter().chain([&taps]) {
-            text.push('\n');
-            text.push_str(stage.text);
-        }
-        text
-    }
+    text
 }

@@ -4,28 +4,35 @@
 //! written again, so that two implementations agreeing means something. `wgsl/spec.wgsl` is this
 //! module's output, committed; a test compares them.
 
+use ntmu_isa::accumulate::Overflow;
 use ntmu_isa::activation::{Activation, GATE_FRACTION_BITS, GATE_RANGE};
-use ntmu_isa::embed::{ACTIVATION_RANGE, INPUT_FRACTION_BITS, WAVES_PER_OCTAVE};
+use ntmu_isa::embed::{WAVES_PER_OCTAVE, Wave};
+use ntmu_isa::filter::FilterRule;
+use ntmu_isa::half::activation::SIXTH;
+use ntmu_isa::half::{Half, SumOrder};
 use ntmu_isa::limits::{MAX_CHANNELS, MAX_LAYERS};
 use ntmu_isa::position::{AddressMode, CornerSnap, PHASE_BITS};
-use ntmu_isa::rescale::Requantizer;
+use ntmu_isa::rescale::{Multiplier, Requantizer};
 use ntmu_isa::round::Rounding;
-use ntmu_isa::shape::OutputFormat;
+use ntmu_isa::shape::{OutputFormat, Sampling};
 use std::fmt::Write;
 
-/// The code of an activation: the one that `.ntx` files use (isa, `format::sections`).
-#[must_use]
-pub const fn activation_code(activation: &Activation) -> u32 {
-    match activation {
-        Activation::Identity => 0,
-        Activation::Relu => 1,
-        Activation::Leaky { .. } => 2,
-        Activation::HardGelu { .. } => 3,
+/// Every activation, its parameters aside.
+const ACTIVATIONS: [Activation; 6] = [
+    Activation::Identity,
+    Activation::Relu,
+    Activation::Leaky { shift: 1 },
+    gelu(false),
+    gelu(true),
+    Activation::Table,
+];
+
+const fn gelu(is_clamped: bool) -> Activation {
+    Activation::HardGelu {
+        scale: Multiplier::power_of_two(0),
+        is_clamped,
     }
 }
-
-/// The names of the activations, in the order of [`activation_code`].
-const ACTIVATIONS: [&str; 4] = ["IDENTITY", "RELU", "LEAKY", "HARD_GELU"];
 
 /// The text of `wgsl/spec.wgsl`.
 #[must_use]
@@ -47,11 +54,16 @@ pub fn generate() -> String {
         code(&mut text, "ADDRESS", mode.name(), mode.code());
     }
 
+    section(&mut text, "isa::filter");
+    for rule in FilterRule::ALL {
+        code(&mut text, "FILTER", rule.name(), rule.code());
+    }
+
     section(&mut text, "isa::embed");
-    let bits = u32::from(INPUT_FRACTION_BITS);
-    unsigned(&mut text, "INPUT_FRACTION_BITS", bits);
     unsigned(&mut text, "WAVES_PER_OCTAVE", u32::from(WAVES_PER_OCTAVE));
-    range(&mut text, "ACTIVATION", ACTIVATION_RANGE);
+    for wave in Wave::ALL {
+        code(&mut text, "WAVE", wave.name(), wave.code());
+    }
 
     section(&mut text, "isa::round");
     for mode in Rounding::ALL {
@@ -64,15 +76,36 @@ pub fn generate() -> String {
         code(&mut text, "REQUANTIZER", name, requantizer.code());
     }
 
+    section(&mut text, "isa::accumulate");
+    for overflow in Overflow::ALL {
+        code(&mut text, "OVERFLOW", overflow.name(), overflow.code());
+    }
+
+    section(&mut text, "isa::half");
+    bits(&mut text, "HALF_ONE", u32::from(Half::ONE.bits()));
+    bits(&mut text, "HALF_MAX", u32::from(Half::MAX.bits()));
+    bits(&mut text, "FLOAT_SIXTH", SIXTH.to_bits());
+    for order in SumOrder::ALL {
+        code(&mut text, "SUM", order.name(), order.code());
+    }
+
     section(&mut text, "isa::activation");
-    let bits = u32::from(GATE_FRACTION_BITS);
-    unsigned(&mut text, "GATE_FRACTION_BITS", bits);
+    let fraction = u32::from(GATE_FRACTION_BITS);
+    unsigned(&mut text, "GATE_FRACTION_BITS", fraction);
     range(&mut text, "GATE", GATE_RANGE);
-    for (code, name) in (0..).zip(ACTIVATIONS) {
-        unsigned(&mut text, &format!("ACTIVATION_{name}"), code);
+    for activation in ACTIVATIONS {
+        code(
+            &mut text,
+            "ACTIVATION",
+            activation.name(),
+            activation.code(),
+        );
     }
 
     section(&mut text, "isa::shape");
+    for sampling in Sampling::ALL {
+        code(&mut text, "SAMPLING", sampling.name(), sampling.code());
+    }
     for format in OutputFormat::ALL {
         code(&mut text, "OUTPUT", format.name(), format.code());
         let name = format!("OUTPUT_{}", constant_name(format.name()));
@@ -87,6 +120,10 @@ fn section(text: &mut String, module: &str) {
 
 fn unsigned(text: &mut String, name: &str, value: u32) {
     line(text, format_args!("const {name}: u32 = {value}u;"));
+}
+
+fn bits(text: &mut String, name: &str, value: u32) {
+    line(text, format_args!("const {name}: u32 = {value:#x}u;"));
 }
 
 fn code(text: &mut String, prefix: &str, name: &str, value: u8) {
@@ -111,7 +148,6 @@ fn line(text: &mut String, line: std::fmt::Arguments<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ntmu_isa::rescale::Multiplier;
     use std::path::Path;
 
     #[test]
@@ -130,16 +166,11 @@ mod tests {
     }
 
     #[test]
-    fn activation_codes_are_those_of_the_names() {
+    fn no_activation_is_left_out() {
         let scale = Multiplier::power_of_two(0);
-        for activation in [
-            Activation::Identity,
-            Activation::Relu,
-            Activation::Leaky { shift: 1 },
-            Activation::HardGelu { scale },
-        ] {
-            let name = ACTIVATIONS[activation_code(&activation) as usize];
-            assert_eq!(name, constant_name(activation.name()));
-        }
+        let named: Vec<_> = (0..=u8::MAX)
+            .filter_map(|code| Activation::from_code(code, 1, scale))
+            .collect();
+        assert_eq!(named, ACTIVATIONS);
     }
 }

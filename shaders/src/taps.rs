@@ -5,7 +5,7 @@
 
 use crate::source::TAP_CORNER_WORDS;
 use ntmu_isa::Asset;
-use ntmu_isa::position::AxisPosition;
+use ntmu_isa::position::{AxisPosition, PHASE_BITS};
 
 /// What one grid contributed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,13 +22,14 @@ pub struct GridTap {
     pub codes: Vec<u8>,
 }
 
-/// What one layer made.
+/// What one layer made. Of an fp16 layer the sums are binary32 numbers by their bits, and the
+/// outputs, where they are halves, binary16 numbers by theirs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LayerTap {
     /// Bias plus products, one for each row.
     pub accumulators: Vec<i32>,
-    /// The accumulators after the activation: unchanged by the identity, the gate's products of a
-    /// hard GELU.
+    /// The sums after the activation and before the skip path: unchanged by the identity; of an
+    /// integer layer the gate's products of a hard GELU, and the entries of a table.
     pub activated: Vec<i32>,
     /// The layer's output values; empty in the last layer, which makes the channel codes.
     pub outputs: Vec<i16>,
@@ -143,7 +144,8 @@ fn read_grid(run: Run, words: &[i32]) -> GridTap {
     let axis = |at: usize| AxisPosition {
         first: corners[at],
         stride: corners[at + 1] as u32,
-        phase: byte(corners[at + 2]),
+        phase: corners[at + 2].clamp(0, i32::from(u16::MAX)) as u16,
+        phase_bits: PHASE_BITS,
     };
     let pair = |at: usize| [corners[at] as u32, corners[at + 1] as u32];
     let codes = run.of(words, TAP_CORNER_WORDS);

@@ -3,26 +3,23 @@
 use crate::error::TwinError;
 use crate::gpu::{AdapterInfo, Gpu};
 use crate::pack::{self, Packed};
-use crate::source::{STEP_LANES, Sizes, WORKGROUP};
+use crate::part::{parts, work};
+use crate::source::{WORKGROUP, source};
 use crate::taps::{TapLayout, Taps};
+use crate::variant::Variant;
 use ntmu_isa::Asset;
 use ntmu_isa::shape::Shape;
 use std::sync::OnceLock;
 
-/// Products of one dispatch at most, unless one workgroup has more: drivers of devices that show
-/// pictures stop work that takes seconds.
-const DISPATCH_MACS: u64 = 1 << 32;
+/// Products of bytes, or what takes as long, of one dispatch at most, unless one workgroup has more:
+/// drivers of devices that show pictures stop work that takes seconds.
+const DISPATCH_WORK: u64 = 1 << 32;
 
 /// Texels of one dispatch at most: bounds what the host keeps beside the answer.
 const DISPATCH_TEXELS: u64 = 1 << 20;
 
 /// Bytes of vectors or of taps of one dispatch at most.
 const DISPATCH_BYTES: u64 = 1 << 26;
-
-/// Iterations of all loops of one invocation in one pass. llvmpipe ends a shader's loops, without
-/// a word, after 65,535 of them in all (Mesa, `LP_MAX_TGSI_LOOP_ITERATIONS`); half of that leaves
-/// room for the embedding and for any one layer.
-const PASS_ITERATIONS: u32 = 1 << 15;
 
 /// x, y, mip, as in `wgsl/bindings.wgsl`.
 type RequestWords = [u32; 3];
@@ -32,12 +29,13 @@ type RequestWords = [u32; 3];
 pub struct Twin {
     gpu: Gpu,
     shape: Shape,
-    sizes: Sizes,
-    macs: u64,
+    variant: Variant,
+    /// Of one texel; see [`DISPATCH_WORK`].
+    work: u64,
     layout: TapLayout,
     /// Header, grids, rows and weights with their bindings.
     buffers: Vec<(u32, wgpu::Buffer)>,
-    /// The layers of each pass, in order.
+    /// What each pass runs, in order.
     parts: Vec<wgpu::Buffer>,
     decode: wgpu::ComputePipeline,
     /// Compiled when taps are first asked for.
@@ -77,19 +75,19 @@ impl Twin {
             (4, gpu.upload("rows", &packed.rows, storage)?),
             (5, gpu.upload("weights", &packed.weights, storage)?),
         ];
-        let sizes = Sizes::of(asset);
+        let variant = Variant::of(asset);
         Ok(Twin {
             gpu: gpu.clone(),
             shape: asset.shape.clone(),
-            sizes,
-            macs: u64::from(asset.macs()),
+            variant,
+            work: work(asset),
             layout,
             buffers,
             parts: parts(asset)
                 .iter()
-                .map(|part| gpu.upload("part", part, wgpu::BufferUsages::UNIFORM))
+                .map(|part| gpu.upload("part", &part.words(), wgpu::BufferUsages::UNIFORM))
                 .collect::<Result<_, _>>()?,
-            decode: gpu.pipeline(sizes.source(false), "decode")?,
+            decode: gpu.pipeline(source(&variant, false), "decode")?,
             decode_taps: OnceLock::new(),
         })
     }
@@ -169,7 +167,7 @@ impl Twin {
         if let Some(pipeline) = self.decode_taps.get() {
             return Ok(pipeline);
         }
-        let pipeline = self.gpu.pipeline(self.sizes.source(true), "decode")?;
+        let pipeline = self.gpu.pipeline(source(&self.variant, true), "decode")?;
         Ok(self.decode_taps.get_or_init(|| pipeline))
     }
 
@@ -200,9 +198,9 @@ impl Twin {
     fn chunk(&self) -> u64 {
         let texel_bytes = (4 * u64::from(self.shape.channel_count()))
             .max(size_of::<RequestWords>() as u64)
-            .max(16 * u64::from(self.sizes.vector_elements()));
+            .max(16 * u64::from(self.variant.texel_elements()));
         let group = u64::from(WORKGROUP);
-        (DISPATCH_MACS / self.macs)
+        (DISPATCH_WORK / self.work)
             .min(DISPATCH_TEXELS)
             .min(self.gpu.max_binding_bytes().min(DISPATCH_BYTES) / texel_bytes)
             .min(u64::from(self.gpu.max_workgroups()) * group)
@@ -221,7 +219,7 @@ impl Twin {
     /// The vectors of a dispatch.
     fn vectors(&self, texels: u64) -> Result<wgpu::Buffer, TwinError> {
         self.gpu
-            .results(texels * 4 * u64::from(self.sizes.vector_elements()))
+            .results(texels * 4 * u64::from(self.variant.texel_elements()))
     }
 
     /// The bindings of every pass: the asset's, a dispatch's own, and the pass's part.
@@ -261,25 +259,6 @@ impl Twin {
             allowed,
         })
     }
-}
-
-/// The layers of each pass, as `Part` in `wgsl/bindings.wgsl`.
-fn parts(asset: &Asset) -> Vec<[u32; 4]> {
-    let mut parts = Vec::new();
-    let (mut first, mut iterations) = (0, 0);
-    for (index, layer) in (0_u32..).zip(&asset.layers) {
-        let rows = u32::from(layer.outputs);
-        let steps = u32::from(layer.inputs).div_ceil(STEP_LANES);
-        // The steps of each four rows, the end of that loop, and the rows one by one.
-        let own = rows.div_ceil(4) * (steps + 2) + rows;
-        if index > first && iterations + own > PASS_ITERATIONS {
-            parts.push([first, index, 0, 0]);
-            (first, iterations) = (index, 0);
-        }
-        iterations += own;
-    }
-    parts.push([first, asset.layers.len() as u32, 0, 0]);
-    parts
 }
 
 fn words((x, y, mip): (u32, u32, u8)) -> RequestWords {

@@ -10,19 +10,20 @@ fn decode(@builtin(global_invocation_id) id: vec3<u32>) {
     tap_texel(texel);
     vector_start(texel);
 
-    if (part.first_layer == 0u) {
+    if (part.first_layer == 0u && part.first_row == 0u) {
         embed(request);
     }
     for (var index = part.first_layer; index < part.end_layer; index++) {
-        run_layer(index, texel);
+        run_layer(index, texel, part.first_row, part.end_row);
     }
 }
 
 fn embed(request: Request) {
     let corners0 = position(0u, request);
     let corners1 = position(1u, request);
-    var lane = concat(0u, corners0, 0u);
-    lane = lerp(1u, corners1, lane);
+    var lane = sample(0u, SAMPLING_GRID0, corners0, 0u);
+    lane = sample(1u, SAMPLING_GRID1, corners1, lane);
     lane = waves(request, lane);
     lane = level(request, lane);
+    padding(lane);
 }

@@ -1,5 +1,6 @@
-// Output: the last layer's accumulators become channel codes. See isa/src/shape.rs, `OutputFormat`.
+// Output: the last layer's sums become channel codes. See isa/src/shape.rs, `OutputFormat`.
 
+// Of the formats that hold integers.
 fn output_range(format: u32) -> vec2<i32> {
     switch format {
         case OUTPUT_UNORM16: {
@@ -14,12 +15,26 @@ fn output_range(format: u32) -> vec2<i32> {
     }
 }
 
+fn output_code(format: u32, row: Row, accumulator: i32) -> i32 {
+    if (HAS_FLOAT_OUTPUT && format == OUTPUT_FLOAT16) {
+        // One rounding of the exact product.
+        let product = wide_multiply(accumulator, row.mantissa);
+        return bitcast<i32>(half_from_fixed(product, row.shift));
+    }
+    let range = output_range(format);
+    let rescaled = requantizer_apply(PROFILE_OUTPUT, accumulator, row.mantissa, row.shift);
+    return clamp(rescaled, range.x, range.y);
+}
+
 // One row of the last layer: the code of a texel's channel.
 fn emit(layer: Layer, texel: u32, channel: u32, accumulator: i32) {
-    let row = rows[layer.row + channel];
-    let range = output_range(header.outputs[channel >> 2u][channel & 3u]);
-    let rescaled = requantizer_apply(PROFILE_OUTPUT, accumulator, row.mantissa, row.shift);
-    let code = clamp(rescaled, range.x, range.y);
+    let format = header.outputs[channel >> 2u][channel & 3u];
+    var code = 0i;
+    if (is_half(layer)) {
+        code = output_code_half(format, bitcast<u32>(accumulator));
+    } else {
+        code = output_code(format, rows[layer.row + channel], accumulator);
+    }
     codes[texel * header.channels + channel] = code;
     tap(layer.tap + channel, accumulator);
     tap(layer.tap + layer.outputs + channel, accumulator);

@@ -20,6 +20,10 @@ fn wide_is_negative(value: Wide) -> bool {
     return bitcast<i32>(value.high) < 0;
 }
 
+fn wide_negate(value: Wide) -> Wide {
+    return wide_add(Wide(~value.low, ~value.high), Wide(1u, 0u));
+}
+
 // value · factor. The unsigned product counts a negative value 2^32 too high, so the factor is
 // taken off the upper word. The four partial products are of 16-bit halves; no sum of them here
 // reaches 2^32.

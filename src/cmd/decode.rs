@@ -1,5 +1,6 @@
 //! `ntmu decode`: an asset to image files.
 
+use super::profile::ProfileChoice;
 use crate::Verdict;
 use crate::{console, files};
 use ndarray::{Axis, Slice};
@@ -23,6 +24,8 @@ pub(crate) struct Decode {
     /// How to store the texels; by default as in the source: png8, png16, or exr for floats.
     #[arg(long, value_enum)]
     format: Option<Format>,
+    #[command(flatten)]
+    profile: ProfileChoice,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -53,7 +56,7 @@ fn stored_depth(map: &Map) -> Depth {
 
 impl Decode {
     pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
-        let asset = files::read_asset(&self.asset)?;
+        let asset = self.profile.apply(files::read_asset(&self.asset)?)?;
         let mip_count = asset.shape.mip_count;
         if let Some(mip) = self.mip {
             anyhow::ensure!(
@@ -71,7 +74,9 @@ impl Decode {
         let depth = self.format.map(Format::depth);
         let written = write_all(&asset, &decoded, self.mip, depth, &self.output)?;
         if json {
-            console::print_json(&json!({ "written": written }))?;
+            console::print_json(
+                &json!({ "profile": asset.profile.identity(), "written": written }),
+            )?;
         } else {
             console::print(
                 &written

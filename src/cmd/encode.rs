@@ -44,6 +44,12 @@ pub(crate) struct Encode {
     /// Bits of a latent instead of the preset's.
     #[arg(long, value_name = "BITS")]
     latent_bits: Option<u8>,
+    /// The arithmetic of every layer: int8 or fp16.
+    #[arg(long, value_name = "PRECISION")]
+    precision: Option<String>,
+    /// Bits of an activation instead of the preset's.
+    #[arg(long, value_name = "BITS")]
+    activation_bits: Option<u8>,
     /// Bits of a weight instead of the preset's.
     #[arg(long, value_name = "BITS")]
     weight_bits: Option<u8>,

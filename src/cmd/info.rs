@@ -3,6 +3,8 @@
 use crate::Verdict;
 use crate::{console, files};
 use ntmu::isa::Asset;
+use ntmu::isa::shape::LaneFormat;
+use ntmu::precision;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -32,16 +34,19 @@ fn describe(asset: &Asset) -> serde_json::Value {
             json!({
                 "width": width, "height": height, "channels": shape.grids[g].channels,
                 "bits": shape.grids[g].format.bits(), "scale_log2": shape.grids[g].scale_log2,
+                "sampling": shape.grids[g].sampling.name(),
             })
         })
         .collect();
     let layers: Vec<_> = asset
         .layers
         .iter()
-        .map(|l| {
+        .enumerate()
+        .map(|(index, l)| {
             json!({
                 "inputs": l.inputs, "outputs": l.outputs, "activation": l.activation.name(),
-                "zero_point": l.zero_point, "skip_span": l.skip.map(|s| s.span), "macs": l.macs(),
+                "precision": precision::of_layer(asset, index), "output": register(l.output_format()),
+                "skip_span": l.skip.map(|s| s.span), "macs": l.macs(),
             })
         })
         .collect();
@@ -62,18 +67,22 @@ fn describe(asset: &Asset) -> serde_json::Value {
         "mips": shape.mip_count, "channels": shape.channel_count(), "maps": maps,
         "grids": grids, "octaves": shape.octaves, "corner_snap": shape.snap.name(),
         "address_mode": shape.address_mode.name(), "inputs": shape.input_count(),
-        "weight_bits": asset.weight_bits, "layers": layers,
+        "wave": shape.wave.name(), "padding": shape.padding, "input_bits": shape.input_bits,
+        "precision": precision::of_asset(asset), "layers": layers,
         "macs_per_texel": asset.macs(),
         "grid_bytes": asset.grid_bits().div_ceil(8),
         "parameter_bytes": asset.parameter_bits().div_ceil(8),
         "bppc": ntmu::quality::bppc(asset),
-        "profile": {
-            "input": profile.input.name(), "leak": profile.leak.name(),
-            "requantize": profile.requantize.name(), "skip": profile.skip.name(),
-            "output": profile.output.name(),
-        },
+        "profile": { "identity": profile.identity(), "choices": profile },
         "record": asset.metadata.record.iter().map(|(k, v)| json!([k, v])).collect::<Vec<_>>(),
     })
+}
+
+fn register(format: LaneFormat) -> String {
+    match format {
+        LaneFormat::Integer { bits, zero_point } => format!("{bits} bits about {zero_point}"),
+        LaneFormat::Half => "halves".to_owned(),
+    }
 }
 
 fn print(asset: &Asset) {
@@ -105,7 +114,12 @@ fn print(asset: &Asset) {
         asset.macs().to_string(),
         "multiplications per texel",
     );
-    fact("weights", asset.weight_bits.to_string(), "bits");
+    fact(
+        "precision",
+        precision::of_asset(asset),
+        "bits of weights and activations",
+    );
+    fact("profile", asset.profile.identity(), "");
     fact("grids", asset.grid_bits().div_ceil(8).to_string(), "bytes");
     fact(
         "parameters",
@@ -139,8 +153,9 @@ fn print(asset: &Asset) {
         "layer",
         "in",
         "out",
+        "numbers",
         "activation",
-        "zero point",
+        "output",
         "skip from",
     ]);
     for (index, layer) in asset.layers.iter().enumerate() {
@@ -151,8 +166,9 @@ fn print(asset: &Asset) {
             index.to_string(),
             layer.inputs.to_string(),
             layer.outputs.to_string(),
+            precision::of_layer(asset, index),
             layer.activation.name().to_owned(),
-            layer.zero_point.to_string(),
+            register(layer.output_format()),
             skip,
         ]);
     }

@@ -1,12 +1,16 @@
 //! The verbs, one file each.
 
+mod certify;
 mod compare;
 mod conform;
+mod convert;
 mod decode;
 mod encode;
 mod generate;
 mod info;
+mod profile;
 mod program;
+mod sample;
 mod study;
 mod texel;
 
@@ -37,10 +41,18 @@ enum Verb {
     Info(info::Info),
     /// Decode one texel and show every value on the way.
     Texel(texel::Texel),
+    /// Sample an asset at normalised coordinates, as a shader would.
+    Sample(sample::Sample),
+    /// Prove what holds for every latent and texel: accumulator widths, safe rescalings, distances.
+    Certify(certify::Certify),
     /// Print the microprogram of an asset.
     Program(program::Program),
     /// Compare an asset, or a decoded folder, with its source.
     Compare(compare::Compare),
+    /// Write an asset in other numbers: fewer bits, fp16, another profile.
+    Convert(convert::Convert),
+    /// List the profiles, or print one: the choices that implementations make differently.
+    Profile(profile::Profile),
     /// Run conformance vectors on a device.
     Conform(conform::Conform),
     /// Write the built-in texture set as image files.
@@ -56,9 +68,13 @@ impl Arguments {
             Verb::Decode(verb) => verb.run(json),
             Verb::Info(verb) => verb.run(json),
             Verb::Texel(verb) => verb.run(json),
+            Verb::Sample(verb) => verb.run(json),
+            Verb::Certify(verb) => verb.run(json),
             Verb::Program(verb) => verb.run(json),
             Verb::Compare(verb) => verb.run(json),
             Verb::Conform(verb) => verb.run(json),
+            Verb::Convert(verb) => verb.run(json),
+            Verb::Profile(verb) => verb.run(json),
             Verb::Generate(verb) => verb.run(json),
         }
     }

@@ -1,12 +1,16 @@
 //! `ntmu texel`: one texel, with every value on the way.
 
+use super::profile::ProfileChoice;
 use crate::Verdict;
 use crate::{console, files};
+use ntmu::isa::half::Half;
 use ntmu::isa::latent::LatentFormat;
 use ntmu::isa::layout::Layout;
+use ntmu::isa::shape::LaneFormat;
 use ntmu::isa::{Asset, Program};
 use ntmu::model::Request;
 use ntmu::model::exec::{Decoder, Taps};
+use ntmu::precision;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -23,11 +27,13 @@ pub(crate) struct Texel {
     /// Where the unit's memory keeps the grids.
     #[arg(long, default_value = "linear", value_parser = super::program::layout)]
     layout: Layout,
+    #[command(flatten)]
+    profile: ProfileChoice,
 }
 
 impl Texel {
     pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
-        let asset = files::read_asset(&self.asset)?;
+        let asset = self.profile.apply(files::read_asset(&self.asset)?)?;
         let request = Request::new(&asset.shape, self.x, self.y, self.mip)?;
         let program = Program::compile(&asset, self.layout);
         let taps = Decoder::new(&asset, &program).taps(request);
@@ -76,9 +82,13 @@ fn describe(asset: &Asset, taps: &Taps) -> Value {
         .layers
         .iter()
         .map(|tap| {
+            let layer = &asset.layers[usize::from(tap.layer)];
+            let is_half = layer.half().is_some();
             json!({
-                "layer": tap.layer, "accumulators": tap.accumulators,
-                "activated": tap.activated, "outputs": tap.outputs,
+                "layer": tap.layer, "precision": precision::of_layer(asset, usize::from(tap.layer)),
+                "accumulators": Sums(&tap.accumulators, is_half).json(),
+                "activated": Sums(&tap.activated, is_half).json(),
+                "outputs": Lanes(&tap.outputs, layer.output_format()).json(),
             })
         })
         .collect();
@@ -94,15 +104,68 @@ fn describe(asset: &Asset, taps: &Taps) -> Value {
         .collect();
     json!({
         "x": taps.request.x(), "y": taps.request.y(), "mip": taps.request.mip(),
+        "profile": asset.profile.identity(),
         "grids": grids, "inputs": taps.inputs, "layers": layers, "codes": taps.codes, "maps": maps,
     })
 }
 
-/// Numbers in rows of sixteen, each row led by the index of its first.
+/// The accumulators of a layer; those of an fp16 layer are the bits of f32 numbers.
+struct Sums<'a>(&'a [i32], bool);
+
+impl Sums<'_> {
+    fn reals(&self) -> Vec<f32> {
+        let bits = self.0.iter().map(|&sum| sum as u32);
+        bits.map(f32::from_bits).collect()
+    }
+
+    fn json(&self) -> Value {
+        if self.1 {
+            json!(self.reals())
+        } else {
+            json!(self.0)
+        }
+    }
+
+    fn rows(&self) -> String {
+        if self.1 {
+            rows(&self.reals(), 14)
+        } else {
+            rows(self.0, 9)
+        }
+    }
+}
+
+/// The lanes of a register; halves are bits of binary16 numbers.
+struct Lanes<'a>(&'a [i16], LaneFormat);
+
+impl Lanes<'_> {
+    fn halves(&self) -> Vec<f32> {
+        let bits = self.0.iter().map(|&lane| lane as u16);
+        bits.map(|bits| Half::from_bits(bits).to_f32()).collect()
+    }
+
+    fn json(&self) -> Value {
+        match self.1 {
+            LaneFormat::Integer { .. } => json!(self.0),
+            LaneFormat::Half => json!(self.halves()),
+        }
+    }
+
+    fn rows(&self) -> String {
+        match self.1 {
+            LaneFormat::Integer { bits: 0..=8, .. } => rows(self.0, 4),
+            LaneFormat::Integer { .. } => rows(self.0, 6),
+            LaneFormat::Half => rows(&self.halves(), 14),
+        }
+    }
+}
+
+/// Numbers in rows, each row led by the index of its first.
 fn rows<T: std::fmt::Display>(numbers: &[T], width: usize) -> String {
     let mut text = String::new();
-    for (row, numbers) in numbers.chunks(16).enumerate() {
-        text.push_str(&format!("  {:>4} ", row * 16));
+    let columns = if width > 9 { 8 } else { 16 };
+    for (row, numbers) in numbers.chunks(columns).enumerate() {
+        text.push_str(&format!("  {:>4} ", row * columns));
         for number in numbers {
             text.push_str(&format!(" {number:>width$}"));
         }
@@ -145,8 +208,9 @@ fn print(asset: &Asset, taps: &Taps) {
         }
     }
     text.push_str(&format!(
-        "\ninputs, real = value/128\n{}",
-        rows(&taps.inputs, 4)
+        "\ninputs, real = value/{}\n{}",
+        1 << (asset.shape.input_bits - 1),
+        Lanes(&taps.inputs, asset.shape.input_format()).rows()
     ));
     for tap in &taps.layers {
         let layer = &asset.layers[usize::from(tap.layer)];
@@ -156,21 +220,26 @@ fn print(asset: &Asset, taps: &Taps) {
             tap.layer,
             layer.inputs,
             layer.outputs,
-            rows(&tap.accumulators, 9)
+            Sums(&tap.accumulators, layer.half().is_some()).rows()
         ));
         if tap.activated != tap.accumulators {
-            text.push_str(&format!(" activated\n{}", rows(&tap.activated, 9)));
+            let activated = Sums(&tap.activated, layer.half().is_some());
+            text.push_str(&format!(" activated\n{}", activated.rows()));
         }
         if !tap.outputs.is_empty() {
-            let zero_point = layer.zero_point;
             let skip = layer.skip.map_or(String::new(), |s| {
                 format!(
                     ", with the skip path from layer {}",
                     usize::from(tap.layer) - usize::from(s.span)
                 )
             });
-            text.push_str(&format!(" outputs, zero at {zero_point}{skip}\n"));
-            text.push_str(&rows(&tap.outputs, 4));
+            let format = layer.output_format();
+            let zero = match format {
+                LaneFormat::Integer { zero_point, .. } => format!(", zero at {zero_point}"),
+                LaneFormat::Half => String::new(),
+            };
+            text.push_str(&format!(" outputs{zero}{skip}\n"));
+            text.push_str(&Lanes(&tap.outputs, format).rows());
         }
     }
     text.push_str("\ncodes\n");

@@ -4,7 +4,10 @@
 //! page, colours follow the reader's light or dark setting. The same study gives the same bytes.
 //! Every text that comes from data is escaped by the template engine.
 
+mod claims;
 mod exactness;
+mod in_between;
+mod lines;
 mod maps;
 mod number;
 mod overview;
@@ -16,6 +19,7 @@ mod svg;
 #[cfg(test)]
 mod tests;
 mod timing;
+mod variants;
 
 use crate::study::Study;
 use maud::{DOCTYPE, PreEscaped, html as markup};
@@ -102,8 +106,11 @@ pub fn html(study: &Study, pictures: &[MapPicture<'_>]) -> Result<String, Report
                     (maps)
                     (quality::section(study))
                     (exactness::section(&study.oracle))
+                    (claims::section(&study.claims))
                     (timing)
                     (precision::section(study))
+                    (in_between::section(study))
+                    (variants::section(study))
                 }
             }
         }

@@ -120,7 +120,10 @@ fn facts(study: &Study) -> Markup {
             (fact("Channels", html! { (asset.channels) }, html! { "decoded together, per texel" }))
             (fact("Latents", html! { (first) " / " (second) span.unit { " bit" } },
                 html! { "per latent of grid 0 / grid 1" }))
-            (fact("Weights", html! { (asset.weight_bits) span.unit { " bit" } }, html! { "per weight" }))
+            (fact("Precision", html! { (asset.precision) },
+                html! { "bits of weights (w) and activations (a)" }))
+            (fact("Profile", html! { (asset.profile) },
+                html! { "the choices of the arithmetic, name and hash" }))
             (fact("MAC per texel", html! { (integer(asset.macs_per_texel.into())) },
                 html! { "multiply-accumulates of the synthesizer" }))
             (fact("Stored", html! { (bytes(total)) },

@@ -1,7 +1,7 @@
 //! Precision: what fewer latent and weight bits cost in quality, and save in storage.
 
+use super::lines::{Lines, Series};
 use super::number::{decimal, psnr};
-use super::svg::{Axis, COLOURS, px, round_step};
 use crate::study::{Study, SweepPoint};
 use maud::{Markup, html};
 
@@ -128,121 +128,30 @@ fn table(points: &[SweepPoint]) -> Markup {
     }
 }
 
-/// The colours that lines use, in order: far apart for every kind of colour vision.
-const LINES: [usize; 4] = [0, 3, 4, 1];
-
 fn chart(points: &[SweepPoint]) -> Markup {
-    let (latents, weights) = (
-        widths(points, |p| p.latent_bits),
-        widths(points, |p| p.weight_bits),
-    );
-    let (Some((low, high)), Some(first), Some(last)) =
-        (range(points), latents.first(), latents.last())
-    else {
-        return html! { p.missing { "No point has a finite PSNR to draw." } };
-    };
-    let step = round_step(((high - low) / 5.0).max(0.05));
-    let bottom = ((low - step * 0.25) / step).floor() * step;
-    let top = ((high + step * 0.25) / step).ceil() * step;
-    let up = Axis {
-        values: (bottom, top),
-        pixels: (250.0, 26.0),
-    };
-    let margin = if first == last { 1.0 } else { 0.15 };
-    let bits = (f64::from(*first) - margin, f64::from(*last) + margin);
-    let along = Axis {
-        values: bits,
-        pixels: (52.0, 450.0),
-    };
-    let line = |weight: u8| -> Vec<(f64, f64)> {
-        let mut line: Vec<_> = points
-            .iter()
-            .filter(|point| point.weight_bits == weight)
-            .collect();
+    let latents = widths(points, |p| p.latent_bits);
+    let mut weights = widths(points, |p| p.weight_bits);
+    weights.reverse();
+    let series = weights.iter().map(|&weight| {
+        let mut line: Vec<_> = points.iter().filter(|p| p.weight_bits == weight).collect();
         line.sort_by_key(|point| point.latent_bits);
-        line.iter()
-            .filter(|point| point.psnr.is_finite())
-            .map(|point| (along.at(point.latent_bits.into()), up.at(point.psnr)))
-            .collect()
-    };
-    let lines: Vec<_> = weights
-        .iter()
-        .rev()
-        .map(|weight| (*weight, line(*weight)))
-        .collect();
-    let labels = spread(
-        lines
-            .iter()
-            .filter_map(|(_, line)| line.last().map(|end| end.1))
-            .collect(),
-    );
-    let labelled = lines
-        .iter()
-        .filter(|(_, line)| !line.is_empty())
-        .zip(labels);
-    html! {
-        svg viewBox="0 0 560 300" role="img" aria-label="PSNR over latent bits, one line per weight width" {
-            @for (value, label) in up.ticks(5) {
-                @let y = px(up.at(value));
-                line.gridline x1="52" x2="450" y1=(y) y2=(y) {}
-                text.tick x="46" y=(y) dy="4" text-anchor="end" { (label) }
-            }
-            @for latent in &latents {
-                text.tick x=(px(along.at((*latent).into()))) y="267" text-anchor="middle" { (latent) }
-            }
-            line.baseline x1="52" x2="450" y1="250" y2="250" {}
-            text.axis x="251" y="292" text-anchor="middle" { "latent bits, both grids" }
-            text.axis x="4" y="12" { "PSNR, dB" }
-            @for (index, ((weight, line), label)) in labelled.enumerate() {
-                @let colour = LINES[index % LINES.len()] % COLOURS;
-                polyline class={ "line stroke" (colour) } points=(path(line)) {}
-                @for (x, y) in line { (marker(index, colour, *x, *y)) }
-                @if let Some((x, y)) = line.last() {
-                    line.leader x1=(px(x + 6.0)) x2="462" y1=(px(*y)) y2=(px(label - 4.0)) {}
-                }
-                text.value x="466" y=(px(label)) { (weight) "-bit weights" }
-            }
-        }
-    }
-}
-
-fn path(line: &[(f64, f64)]) -> String {
-    line.iter()
-        .map(|(x, y)| format!("{},{}", px(*x), px(*y)))
-        .collect::<Vec<_>>()
-        .join(" ")
-}
-
-/// A shape per line, so that lines differ without colour.
-fn marker(index: usize, colour: usize, x: f64, y: f64) -> Markup {
-    let class = format!("fill{colour}");
-    let shape = |corners: &[(f64, f64)]| {
-        path(
-            &corners
+        Series {
+            label: format!("{weight}-bit weights"),
+            points: line
                 .iter()
-                .map(|(dx, dy)| (x + dx, y + dy))
-                .collect::<Vec<_>>(),
-        )
-    };
-    html! {
-        @match index % 4 {
-            0 => { circle class=(class) cx=(px(x)) cy=(px(y)) r="4.5" {} }
-            1 => { polygon class=(class) points=(shape(&[(-4.2, -4.2), (4.2, -4.2), (4.2, 4.2), (-4.2, 4.2)])) {} }
-            2 => { polygon class=(class) points=(shape(&[(0.0, -5.5), (5.2, 4.2), (-5.2, 4.2)])) {} }
-            _ => { polygon class=(class) points=(shape(&[(0.0, -5.8), (5.8, 0.0), (0.0, 5.8), (-5.8, 0.0)])) {} }
+                .map(|p| (f64::from(p.latent_bits), p.psnr))
+                .collect(),
         }
+    });
+    let chart = Lines {
+        title: "PSNR over latent bits, one line per weight width",
+        along: "latent bits, both grids",
+        up: "PSNR, dB",
+        ticks: latents.iter().map(|&bits| f64::from(bits)).collect(),
+        series: series.collect(),
+    };
+    match chart.draw() {
+        Some(drawing) => drawing,
+        None => html! { p.missing { "No point has a finite PSNR to draw." } },
     }
-}
-
-/// Baselines of labels for lines that end at these heights: at least one text line apart.
-fn spread(ends: Vec<f64>) -> Vec<f64> {
-    let mut order: Vec<usize> = (0..ends.len()).collect();
-    order.sort_by(|a, b| ends[*a].total_cmp(&ends[*b]));
-    let mut labels = vec![0.0; ends.len()];
-    let mut above = f64::NEG_INFINITY;
-    for index in order {
-        labels[index] = (ends[index] + 4.0).max(above + 16.0);
-        above = labels[index];
-    }
-    labels
 }

@@ -2,18 +2,26 @@
 //!
 //! `ntmu study` prints it, writes it as JSON, and draws it as a report.
 
+mod claims;
+mod in_between;
 mod oracle;
 mod sweep;
 mod timing;
 mod twin;
+mod variants;
 mod vectors;
 
+pub use claims::try_claims;
+pub use in_between::{InBetween, in_between, in_between_points};
+pub use ntmu_conformance::claims::Findings;
 pub use oracle::{OracleStudy, compare_with_oracle};
 pub use sweep::{SweepPoint, SweepStudyError, sweep, sweep_points};
 pub use timing::{Charge, TimingRow, simulate, timing_points};
 pub use twin::{TwinStudy, compare_with_twin};
+pub use variants::{Variant, VariantError, VariantOutcome, variant_count, variants};
 pub use vectors::vectors;
 
+use crate::precision;
 use crate::quality::{self, Quality};
 use ntmu_isa::Asset;
 use serde::Serialize;
@@ -33,8 +41,10 @@ pub struct AssetStudy {
     pub texels: u64,
     /// Bits of a latent of grid 0 and of grid 1.
     pub latent_bits: [u8; 2],
-    /// Bits of a weight.
-    pub weight_bits: u8,
+    /// Widths of weights and activations, `w8a8`; see [`precision::of_asset`].
+    pub precision: String,
+    /// The profile's name and hash.
+    pub profile: String,
     /// Multiplications per texel.
     pub macs_per_texel: u32,
     /// Bytes of both grids.
@@ -57,7 +67,8 @@ impl AssetStudy {
             channels: shape.channel_count(),
             texels: shape.texel_count(),
             latent_bits: shape.grids.map(|grid| grid.format.bits()),
-            weight_bits: asset.weight_bits,
+            precision: precision::of_asset(asset),
+            profile: asset.profile.identity(),
             macs_per_texel: asset.macs(),
             grid_bytes: asset.grid_bits().div_ceil(8),
             parameter_bytes: asset.parameter_bits().div_ceil(8),
@@ -75,19 +86,25 @@ pub struct Study {
     pub quality: Option<Quality>,
     /// Against the real-number truth.
     pub oracle: OracleStudy,
+    /// The three claims, at a sample of texels.
+    pub claims: Findings,
     /// Against the GPU twin.
     pub twin: TwinStudy,
     /// Per unit and layout.
     pub timing: Vec<TimingRow>,
     /// Per latent width and weight width; empty without a source.
     pub sweep: Vec<SweepPoint>,
+    /// Between mips, per level of detail and way to decode; empty without a source.
+    pub in_between: Vec<InBetween>,
+    /// The asset in other numbers and under other profiles.
+    pub variants: Vec<Variant>,
 }
 
 impl Study {
-    /// Whether every check held: the twin, if it ran, agreed on every code, and no code was farther
-    /// from the oracle than the derived bound allows.
+    /// Whether every check held: the twin, if it ran, agreed on every code, no code was farther
+    /// from the oracle than the derived bound allows, and every claim is true of its sample.
     #[must_use]
     pub fn holds(&self) -> bool {
-        self.twin.holds() && self.oracle.holds()
+        self.twin.holds() && self.oracle.holds() && self.claims.hold()
     }
 }

@@ -61,7 +61,8 @@ pub fn compare_with_oracle(
                     let request = Request::new(&asset.shape, column as u32, row as u32, mip);
                     // The codes have the chain's own shape, so the request exists.
                     if let Ok(request) = request {
-                        histogram.record(request, &texel.to_vec(), &oracle.texel(request));
+                        let formats = &asset.shape.outputs;
+                        histogram.record(request, formats, &texel.to_vec(), &oracle.texel(request));
                     }
                 }
                 histogram

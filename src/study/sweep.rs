@@ -2,8 +2,8 @@
 
 use crate::decoded::Decoded;
 use crate::metrics::{self, MetricsError};
+use crate::precision::{self, PrecisionError, narrow};
 use crate::quality;
-use crate::sweep::{SweepError, narrow};
 use ndarray::Array3;
 use ntmu_isa::Asset;
 use serde::Serialize;
@@ -26,7 +26,7 @@ pub struct SweepPoint {
 pub enum SweepStudyError {
     /// A point has no asset.
     #[error(transparent)]
-    Narrow(#[from] SweepError),
+    Narrow(#[from] PrecisionError),
     /// A point cannot be compared with the source.
     #[error(transparent)]
     Metrics(#[from] MetricsError),
@@ -70,7 +70,8 @@ fn widths(asset: &Asset) -> impl Iterator<Item = (u8, u8)> + use<> {
         .format
         .bits()
         .min(asset.shape.grids[1].format.bits());
-    let weights = asset.weight_bits;
+    // An asset without integer layers has one width of weights: its own.
+    let weights = precision::weight_bits(asset).max(2);
     let latent_widths = (1..=widest).rev().take(4);
     latent_widths.flat_map(move |latent| {
         (2..=weights)

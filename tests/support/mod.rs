@@ -1,4 +1,9 @@
 //! What several test binaries share.
+#![allow(dead_code, reason = "not every test binary uses all of it")]
+
+pub(crate) mod command;
+#[cfg(feature = "train")]
+pub(crate) mod source;
 
 /// Says that a test is skipped and why, or fails where nothing, or no adapter, may be missing.
 pub(crate) fn skip(why: &str) {

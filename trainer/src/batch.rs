@@ -47,8 +47,8 @@ pub(crate) struct Batch {
     pub(crate) texels: Vec<Texel>,
     /// Where each texel's corners lie in grid 0 and in grid 1.
     pub(crate) corners: [Vec<[u32; 4]>; 2],
-    /// Weights of grid 1's corners, in 1/256.
-    pub(crate) weights: Vec<[f32; 4]>,
+    /// Weights of those corners, in 1/256.
+    pub(crate) weights: [Vec<[f32; 4]>; 2],
     /// Gradients of the inputs, texels × padded inputs.
     pub(crate) gradient: Vec<f32>,
 }
@@ -66,7 +66,7 @@ impl Batch {
                 len
             ],
             corners: [vec![[0; 4]; len], vec![[0; 4]; len]],
-            weights: vec![[0.0; 4]; len],
+            weights: [vec![[0.0; 4]; len], vec![[0.0; 4]; len]],
             gradient: vec![0.0; len * inputs],
         }
     }

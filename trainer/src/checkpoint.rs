@@ -9,8 +9,8 @@
 //! interrupted write never replaces a good one.
 
 use crate::error::TrainError;
-use crate::integer::Range;
 use crate::model::{Ground, Model};
+use crate::quantise::Range;
 use crate::schedule::Stage;
 use std::path::{Path, PathBuf};
 

@@ -1,11 +1,9 @@
 //! Everything that decides what a training run makes.
 
+use crate::choices::{ActivationKind, Address, GridSampling, Precision, Snap, WaveForm};
 use crate::error::TrainError;
-use ntmu_isa::activation::MAX_LEAK_SHIFT;
-use ntmu_isa::embed::{MAX_OCTAVES, WAVES_PER_OCTAVE};
+use ntmu_isa::embed::WAVES_PER_OCTAVE;
 use ntmu_isa::latent::LatentFormat;
-use ntmu_isa::limits;
-use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::shape::GridShape;
 use serde::{Deserialize, Serialize};
 
@@ -20,63 +18,6 @@ pub struct GridConfig {
     pub scale_log2: u8,
 }
 
-/// The activation of the hidden layers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ActivationKind {
-    /// max(x, 0).
-    Relu,
-    /// x for x ≥ 0, x / 2^shift below.
-    Leaky {
-        /// n of the slope 2^−n, 1..=7.
-        shift: u8,
-    },
-    /// x · clamp(x/3 + ½, 0, 1).
-    HardGelu,
-}
-
-/// Where the first corner lies when the stride is more than one cell; see
-/// [`ntmu_isa::position::CornerSnap`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Snap {
-    /// The cell just below the texel centre.
-    Cell,
-    /// The multiple of the stride just below the texel centre.
-    Stride,
-}
-
-impl From<Snap> for CornerSnap {
-    fn from(snap: Snap) -> CornerSnap {
-        match snap {
-            Snap::Cell => CornerSnap::Cell,
-            Snap::Stride => CornerSnap::Stride,
-        }
-    }
-}
-
-/// What a corner outside the grid means; see [`ntmu_isa::position::AddressMode`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Address {
-    /// The grid repeats.
-    Wrap,
-    /// The grid repeats, every other copy reversed.
-    Mirror,
-    /// The edge cell continues.
-    Clamp,
-}
-
-impl From<Address> for AddressMode {
-    fn from(address: Address) -> AddressMode {
-        match address {
-            Address::Wrap => AddressMode::Wrap,
-            Address::Mirror => AddressMode::Mirror,
-            Address::Clamp => AddressMode::Clamp,
-        }
-    }
-}
-
 /// Steps of each stage, in the order in which they run.
 ///
 /// A step count is part of the configuration and never follows from a clock, so that the same
@@ -87,7 +28,8 @@ pub struct Steps {
     pub encoder: u64,
     /// Latents and synthesizer on the whole set, uniform noise on the latents.
     pub refine: u64,
-    /// The same with rounded latents and the integer synthesizer.
+    /// The same with rounded latents and the synthesizer as the unit computes it: in integers, or
+    /// in fp16 where the layers are.
     pub integer: u64,
 }
 
@@ -98,8 +40,11 @@ pub struct Steps {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainConfig {
-    /// Grid 0, whose corners are concatenated, and grid 1, which is interpolated.
+    /// Grid 0 and grid 1.
     pub grids: [GridConfig; 2],
+    /// What each grid gives the synthesizer. CNTC concatenates the corners of grid 0 and
+    /// interpolates grid 1.
+    pub sampling: [GridSampling; 2],
     /// Widths of the plain hidden layers, 1..=384, each with the activation; at least one.
     pub hidden: Vec<u16>,
     /// Residual blocks after the plain layers, as wide as the last of them.
@@ -110,12 +55,26 @@ pub struct TrainConfig {
     pub activation: ActivationKind,
     /// Octaves of the waves, 0..=3.
     pub octaves: u8,
+    /// See [`WaveForm`].
+    pub wave: WaveForm,
+    /// Zeros after the level, 0..=15.
+    pub padding: u8,
     /// See [`Snap`].
     pub snap: Snap,
     /// See [`Address`].
     pub address: Address,
-    /// Bits of a weight, 2..=8.
+    /// The arithmetic of every layer.
+    pub precision: Precision,
+    /// The arithmetic of each layer, first layer first, in the place of `precision`.
+    pub precision_per_layer: Option<Vec<Precision>>,
+    /// Bits of an input, 4..=16 as far as the sums of the first layer stay exact in training; at
+    /// most 12 where that layer is fp16.
+    pub input_bits: u8,
+    /// Bits of an integer layer's weight, 2..=8.
     pub weight_bits: u8,
+    /// Bits of an activation between two layers of which one is of integers, 4..=16 as far as sums
+    /// stay exact in training: 8 at any width, more in narrow layers.
+    pub activation_bits: u8,
     /// Channels of the encoder's convolutions, a multiple of 2; ELIC has 192.
     pub encoder_width: u16,
     /// Side of a training crop in texels of mip 0, a multiple of 64 from 64 to 4096.
@@ -149,9 +108,12 @@ pub struct TrainConfig {
 }
 
 /// The widest hidden layer: 384 · 127 · 255 + 2^22 is just below 2^24, so that training can hold
-/// accumulators in floats exactly. The inputs have no zero point and may be twice as many.
+/// accumulators in floats exactly. Other widths of bits are checked layer by layer.
 pub(crate) const WIDEST: u16 = 384;
-const _: () = assert!(WIDEST as u32 * 127 * 255 + (1 << 22) < 1 << 24);
+const _: () = assert!(WIDEST as u32 * 127 * 255 + BIAS_LIMIT < 1 << 24);
+
+/// The largest bias of an integer layer before the zero point is folded in.
+pub(crate) const BIAS_LIMIT: u32 = 1 << 22;
 
 /// Chunks of a batch. Fixed, so that sums do not depend on the number of threads.
 pub(crate) const CHUNKS: usize = 8;
@@ -159,81 +121,33 @@ pub(crate) const CHUNKS: usize = 8;
 pub(crate) const TILE: usize = 96;
 
 impl TrainConfig {
-    /// Inputs of the synthesizer: 4·c0 + c1 + waves + the level.
+    /// Inputs of the synthesizer: those of both grids, the waves, the level, the padding.
     #[must_use]
     pub fn input_count(&self) -> usize {
-        4 * usize::from(self.grids[0].channels)
-            + usize::from(self.grids[1].channels)
+        let of_grid = |g: usize| match self.sampling[g] {
+            GridSampling::Corners => 4 * usize::from(self.grids[g].channels),
+            GridSampling::Interpolated => usize::from(self.grids[g].channels),
+        };
+        of_grid(0)
+            + of_grid(1)
             + usize::from(WAVES_PER_OCTAVE) * usize::from(self.octaves)
             + 1
+            + usize::from(self.padding)
     }
 
-    /// Whether every field is in range.
-    ///
-    /// # Errors
-    /// The first field that is not.
-    pub fn validate(&self) -> Result<(), TrainError> {
-        for (index, grid) in self.grids.iter().enumerate() {
-            let field = |name: &str| format!("grids[{index}].{name}");
-            range(
-                field("channels"),
-                grid.channels,
-                1,
-                limits::MAX_GRID_CHANNELS,
-            )?;
-            let (low, high) = limits::LATENT_BITS;
-            range(field("bits"), grid.bits, low, high)?;
-            let (low, high) = limits::GRID_SCALE_LOG2;
-            range(field("scale_log2"), grid.scale_log2, low, high)?;
-        }
-        range("octaves", self.octaves, 0, MAX_OCTAVES)?;
-        range(
-            "inputs",
-            self.input_count(),
-            1,
-            usize::from(limits::MAX_LANES),
-        )?;
-        if self.hidden.is_empty() {
-            return Err(TrainError::config("hidden", "no layer", "at least one"));
-        }
-        for (index, &width) in self.hidden.iter().enumerate() {
-            range(format!("hidden[{index}]"), width, 1, WIDEST)?;
-        }
-        range(
-            "layers_per_block",
-            self.layers_per_block,
-            1,
-            limits::MAX_SKIP_SPAN,
-        )?;
+    /// Layers of the synthesizer.
+    #[must_use]
+    pub fn layer_count(&self) -> usize {
         let blocks = usize::from(self.residual_blocks) * usize::from(self.layers_per_block);
-        let layers = self.hidden.len() + blocks + 1;
-        range("layers", layers, 2, usize::from(limits::MAX_LAYERS))?;
-        if let ActivationKind::Leaky { shift } = self.activation {
-            range("activation.shift", shift, 1, MAX_LEAK_SHIFT)?;
-        }
-        let (low, high) = limits::WEIGHT_BITS;
-        range("weight_bits", self.weight_bits, low, high)?;
-        range("encoder_width", self.encoder_width, 4, 512)?;
-        multiple("encoder_width", u32::from(self.encoder_width), 2)?;
-        range("crop", self.crop, 64, 4096)?;
-        multiple("crop", self.crop, 64)?;
-        range("crops", self.crops, 1, 64)?;
-        range("batch", self.batch, (CHUNKS * TILE) as u32, 1 << 22)?;
-        multiple("batch", self.batch, (CHUNKS * TILE) as u32)?;
-        range("uniform_mips", self.uniform_mips, 0.0, 1.0)?;
-        range("encoder_rate", self.encoder_rate, 0.0, 1.0)?;
-        range("latent_rate", self.latent_rate, 0.0, 1.0)?;
-        range("synthesizer_rate", self.synthesizer_rate, 0.0, 1.0)?;
-        range("integer_rate", self.integer_rate, 0.0, 10.0)?;
-        range("checkpoint_every", self.checkpoint_every, 1, u64::MAX)?;
-        range("effort", self.effort, 0, 100)?;
-        if let Some(steps) = self.steps {
-            let most = 100_000_000;
-            range("steps.encoder", steps.encoder, 0, most)?;
-            range("steps.refine", steps.refine, 0, most)?;
-            range("steps.integer", steps.integer, 0, most)?;
-        }
-        Ok(())
+        self.hidden.len() + blocks + 1
+    }
+
+    /// The arithmetic of a layer; the configuration is valid.
+    pub(crate) fn precision_of(&self, layer: usize) -> Precision {
+        let listed = self.precision_per_layer.as_ref();
+        listed
+            .and_then(|list| list.get(layer).copied())
+            .unwrap_or(self.precision)
     }
 
     /// The shape of grid `grid`; the configuration is valid.
@@ -249,32 +163,7 @@ impl TrainConfig {
             channels,
             format,
             scale_log2,
+            sampling: self.sampling[grid].into(),
         })
-    }
-}
-
-fn range<T: PartialOrd + std::fmt::Display>(
-    field: impl Into<String>,
-    found: T,
-    low: T,
-    high: T,
-) -> Result<(), TrainError> {
-    // A NaN fails both comparisons, as it should.
-    if found >= low && found <= high {
-        Ok(())
-    } else {
-        Err(TrainError::config(field, found, format!("{low}..={high}")))
-    }
-}
-
-fn multiple(field: &str, found: u32, of: u32) -> Result<(), TrainError> {
-    if found.is_multiple_of(of) {
-        Ok(())
-    } else {
-        Err(TrainError::config(
-            field,
-            found,
-            format!("a multiple of {of}"),
-        ))
     }
 }

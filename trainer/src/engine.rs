@@ -66,7 +66,7 @@ impl Engine {
         let Batch {
             texels,
             corners: [c0, c1],
-            weights,
+            weights: [w0, w1],
             gradient,
         } = &mut self.batch;
         let len = texels.len().div_ceil(CHUNKS);
@@ -75,19 +75,16 @@ impl Engine {
             .par_iter_mut()
             .zip(texels.par_chunks(len))
             .zip(c0.par_chunks_mut(len).zip(c1.par_chunks_mut(len)))
-            .zip(
-                weights
-                    .par_chunks_mut(len)
-                    .zip(gradient.par_chunks_mut(len * self.inputs)),
-            )
-            .for_each(|(((chunk, texels), (c0, c1)), (weights, gradient))| {
+            .zip(w0.par_chunks_mut(len).zip(w1.par_chunks_mut(len)))
+            .zip(gradient.par_chunks_mut(len * self.inputs))
+            .for_each(|((((chunk, texels), (c0, c1)), (w0, w1)), gradient)| {
                 Pass {
                     view,
                     scale,
                     chunk,
                     texels,
                     corners: [c0, c1],
-                    weights,
+                    weights: [w0, w1],
                     gradient,
                 }
                 .run();
@@ -136,7 +133,7 @@ struct Pass<'a> {
     chunk: &'a mut Chunk,
     texels: &'a [Texel],
     corners: [&'a mut [[u32; 4]]; 2],
-    weights: &'a mut [[f32; 4]],
+    weights: [&'a mut [[f32; 4]]; 2],
     gradient: &'a mut [f32],
 }
 
@@ -148,7 +145,7 @@ impl Pass<'_> {
             chunk,
             texels,
             corners: [c0, c1],
-            weights,
+            weights: [w0, w1],
             gradient,
         } = self;
         let Chunk {
@@ -162,11 +159,9 @@ impl Pass<'_> {
         let channels = view.texels.channels;
         let width = workspace.inputs.len() / TILE;
         let tiles = texels.chunks(TILE).zip(gradient.chunks_mut(TILE * width));
-        let corners = c0
-            .chunks_mut(TILE)
-            .zip(c1.chunks_mut(TILE))
-            .zip(weights.chunks_mut(TILE));
-        for ((texels, gradient), ((c0, c1), weights)) in tiles.zip(corners) {
+        let corners = c0.chunks_mut(TILE).zip(c1.chunks_mut(TILE));
+        let weights = w0.chunks_mut(TILE).zip(w1.chunks_mut(TILE));
+        for (((texels, gradient), (c0, c1)), (w0, w1)) in tiles.zip(corners).zip(weights) {
             vectorised(GatherTile {
                 view,
                 texels,
@@ -178,7 +173,7 @@ impl Pass<'_> {
                 let (corners, lerp) = view.embedding.corners(view.positions, view.windows, texel);
                 c0[i] = corners[0].map(|at| at as u32);
                 c1[i] = corners[1].map(|at| at as u32);
-                weights[i] = lerp;
+                (w0[i], w1[i]) = (lerp[0], lerp[1]);
                 target.copy_from_slice(view.texels.texel(texel.x, texel.y, texel.mip));
             }
             workspace.forward(view.network);
@@ -231,19 +226,10 @@ impl Vectorised for Scatter<'_> {
             grid,
             gradient,
         } = self;
-        let rows = batch
-            .gradient
-            .chunks_exact(inputs)
-            .zip(&batch.corners[grid]);
-        if grid == 0 {
-            let lanes = 4 * embedding.channels[0];
-            for (row, corners) in rows {
-                embedding.scatter_corners(corners, &row[..lanes], gradient);
-            }
-        } else {
-            for ((row, corners), weights) in rows.zip(&batch.weights) {
-                embedding.scatter_interpolated(corners, weights, row, gradient);
-            }
+        let rows = batch.gradient.chunks_exact(inputs);
+        let corners = batch.corners[grid].iter().zip(&batch.weights[grid]);
+        for (row, (corners, weights)) in rows.zip(corners) {
+            embedding.scatter(grid, corners, weights, row, gradient);
         }
     }
 }

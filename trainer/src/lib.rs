@@ -1,32 +1,39 @@
 //! Makes assets: trains a texture set's grids and synthesizer, first in reals, then on isa's own
-//! integers.
+//! numbers: integers, halves, or both.
 //!
 //! ```text
-//! Source ─► Texels ─► batch ─► sampler ─► network (real | integer) ─► error
-//!              │                  ▲  │                                  │
-//!           encoder ─► latents ───┘  └──────────── gradients ◄──────────┘
+//! Source ─► Texels ─► batch ─► sampler ─► network (real | decode) ─► error
+//!              │                  ▲  │                                 │
+//!           encoder ─► latents ───┘  └──────────── gradients ◄─────────┘
 //! ```
 //!
 //! | module | answers |
 //! |---|---|
 //! | [`Source`], [`TrainConfig`], [`Preset`] | what goes in |
 //! | `positions`, `sampler` | which inputs a texel has: isa's integer formulas, tabulated |
-//! | `topology`, `network`, `tile`, `kernel` | the synthesizer, forward and backward |
-//! | `integer`, `calibrate`, `export` | the integers that stand for it, and the asset |
+//! | `topology`, `network`, `epilogue`, `tile`, `kernel` | the synthesizer, forward and backward |
+//! | `quantise`, `integer`, `half`, `calibrate` | the numbers of the decode that stand for it |
+//! | `export` | the asset |
 //! | `latents`, `adam`, `batch`, `engine`, `refine` | a step on the whole set |
 //! | `schedule`, `train`, `checkpoint`, `report` | the run |
+
+#![forbid(unsafe_code)]
 
 mod adam;
 mod batch;
 mod calibrate;
+mod check_config;
 mod checkpoint;
+mod choices;
 mod config;
 mod crop;
 mod encoder;
 mod engine;
+mod epilogue;
 mod error;
 mod evaluate;
 mod export;
+mod half;
 mod integer;
 mod kernel;
 mod latents;
@@ -34,6 +41,7 @@ mod model;
 mod network;
 mod positions;
 mod preset;
+mod quantise;
 mod random;
 mod refine;
 mod report;
@@ -44,7 +52,8 @@ mod tile;
 mod topology;
 mod train;
 
-pub use config::{ActivationKind, Address, GridConfig, Snap, Steps, TrainConfig};
+pub use choices::{ActivationKind, Address, GridSampling, Precision, Snap, WaveForm};
+pub use config::{GridConfig, Steps, TrainConfig};
 pub use error::TrainError;
 pub use preset::Preset;
 pub use report::{Progress, StageReport, TrainReport, Trained};

@@ -4,9 +4,9 @@ use crate::adam::Moments;
 use crate::config::TrainConfig;
 use crate::error::TrainError;
 use crate::export::shape_of;
-use crate::integer::Range;
 use crate::latents::Latents;
 use crate::positions::Positions;
+use crate::quantise::Range;
 use crate::random::{Purpose, Stream};
 use crate::sampler::{Embedding, Numbers};
 use crate::source::{Source, Texels, real_range};
@@ -71,7 +71,9 @@ impl<'a> Ground<'a> {
         Embedding {
             numbers,
             channels: [0, 1].map(|g: usize| usize::from(grids[g].channels)),
+            sampling: self.config.sampling,
             bits: [0, 1].map(|g: usize| grids[g].bits),
+            input_bits: self.config.input_bits,
             inputs: self.config.input_count(),
         }
     }
@@ -84,7 +86,7 @@ pub(crate) struct Model {
     pub(crate) parameters: Vec<f32>,
     pub(crate) moments: Moments,
     pub(crate) latents: [Latents; 2],
-    /// Ranges of the hidden layers; empty before the integer stage.
+    /// Ranges of the hidden layers' registers; empty before the integer stage.
     pub(crate) ranges: Vec<Range>,
     /// Parameters of the encoder and its constructors; empty where no encoder runs.
     pub(crate) encoder: Vec<f32>,
@@ -135,11 +137,17 @@ fn start(ground: &Ground<'_>, seed: u64) -> Vec<f32> {
     let mut parameters = vec![0.0; topology.parameters];
     let last = topology.layers.len() - 1;
     for (index, layer) in topology.layers.iter().enumerate() {
-        // Most inputs are latents with an eighth of the variance of a unit uniform.
-        let gain = if index == 0 { 2.0 } else { 1.0 };
+        // Most inputs are latents with an eighth of the variance of a unit uniform. Those that are
+        // always zero get no weights: nothing would ever move them.
+        let (gain, live) = if index == 0 {
+            let padding = usize::from(ground.config.padding);
+            (2.0, layer.inputs - padding)
+        } else {
+            (1.0, layer.inputs)
+        };
         let damp = if layer.skip.is_some() { 0.1 } else { 1.0 };
-        let bound = gain * damp * (6.0 / layer.inputs as f32).sqrt();
-        for k in 0..layer.inputs {
+        let bound = gain * damp * (6.0 / live as f32).sqrt();
+        for k in 0..live {
             for o in 0..layer.outputs {
                 let at = layer.weights_at + k * layer.columns() + o;
                 parameters[at] = bound * stream.signed(at as u64);

@@ -48,7 +48,10 @@ impl Positions {
             waves: (0..texels)
                 .flat_map(|texel| {
                     (0..shape.octaves).flat_map(move |octave| {
-                        [false, true].map(|quarter| wave_input(texel, mip, octave, quarter) as f32)
+                        [false, true].map(|quarter| {
+                            let (wave, bits) = (shape.wave, shape.input_bits);
+                            wave_input(wave, texel, mip, octave, quarter, bits) as f32
+                        })
                     })
                 })
                 .collect(),
@@ -64,7 +67,7 @@ impl Positions {
                     .collect(),
             ],
             levels: mips
-                .map(|m| level_input(m, shape.mip_count) as f32)
+                .map(|m| level_input(m, shape.mip_count, shape.input_bits) as f32)
                 .collect(),
             waves_per_axis: 2 * usize::from(shape.octaves),
             grid_sizes,
@@ -78,7 +81,7 @@ impl Positions {
     }
 
     /// Writes the waves and the level of a texel, times `scale`: octave by octave, x then y,
-    /// phase 0 then a quarter, then the level.
+    /// phase 0 then a quarter, then the level, then zeros.
     #[inline(always)]
     pub(crate) fn tail(&self, (x, y, mip): (u32, u32, u8), scale: f32, out: &mut [f32]) {
         let per_axis = self.waves_per_axis;
@@ -98,6 +101,7 @@ impl Positions {
             out[2] = y[0] * scale;
             out[3] = y[1] * scale;
         }
+        rest.fill(0.0);
         rest[0] = self.levels[mip] * scale;
     }
 }
@@ -108,6 +112,7 @@ fn entry(shape: &Shape, texel: u32, mip: u8, cells: [u32; 2]) -> AxisEntry {
     let positions = [of(0), of(1)];
     AxisEntry {
         cells: [0, 1].map(|g: usize| positions[g].corners(cells[g], shape.address_mode)),
-        phase: positions.map(|p| p.phase),
+        // Sixteenths at texel centres, so below 16.
+        phase: positions.map(|p| p.phase as u8),
     }
 }

@@ -1,6 +1,7 @@
 //! Presets: configurations with a name.
 
-use crate::config::{ActivationKind, Address, GridConfig, Snap, TrainConfig};
+use crate::choices::{ActivationKind, Address, GridSampling, Precision, Snap, WaveForm};
+use crate::config::{GridConfig, TrainConfig};
 use crate::error::TrainError;
 
 /// A configuration with a name.
@@ -14,10 +15,15 @@ pub struct Preset {
     hidden: &'static [u16],
     residual_blocks: u8,
     activation: ActivationKind,
+    sampling: [GridSampling; 2],
+    octaves: u8,
+    wave: WaveForm,
+    padding: u8,
 }
 
 const LEAKY: ActivationKind = ActivationKind::Leaky { shift: 3 };
 const GELU: ActivationKind = ActivationKind::HardGelu;
+const GELU_3: ActivationKind = ActivationKind::ClampedHardGelu;
 const RELU: ActivationKind = ActivationKind::Relu;
 
 const fn preset(
@@ -35,21 +41,37 @@ const fn preset(
         hidden,
         residual_blocks,
         activation,
+        sampling: [GridSampling::Corners, GridSampling::Interpolated],
+        octaves: 3,
+        wave: WaveForm::Triangle,
+        padding: 0,
     }
 }
 
 impl Preset {
+    /// The same with both grids interpolated, these waves and this padding.
+    const fn interpolated(self, octaves: u8, wave: WaveForm, padding: u8) -> Preset {
+        Preset {
+            sampling: [GridSampling::Interpolated; 2],
+            octaves,
+            wave,
+            padding,
+            ..self
+        }
+    }
+
     /// Every preset; the first is the default.
     ///
     /// Grids are (channels, bits, log2 of the scale). The CNTC shapes are a reading of the
     /// paper's rates, which fits them all: grids (N/2, N), widths 64, 128, 128, four residual
     /// blocks of two square layers. The NTC shapes have the grids of the NTC paper's mip 0 and
     /// its three hidden layers of 64, but not its feature pyramid: coarse mips stride through the
-    /// one pair of grids, so their rate is 15/16 of the original's. `rtxntc` has the layers of
-    /// the RTX SDK (48-64-48-32-16); its 48 inputs become 49 here, 4·6 corners, 12 interpolated,
-    /// 12 waves and the level, in the place of its two mips of 16 features. `tsnc` has the layers
-    /// of Intel's SDK, whose latents are four block-compressed textures; a grid of one channel at
-    /// half and one of seven at a quarter resolution give 16 inputs with one octave of waves.
+    /// one pair of grids, so their rate is 15/16 of the original's. `rtxntc` has the synthesizer of
+    /// the RTX SDK, 48-64-48-32, with its clamped hard GELU and its saw waves: two grids of 16
+    /// interpolated features, one at half the other's resolution as two mips of its latents are,
+    /// in the SDK's shape of 5 bits per texel; 12 waves, the level (once, in the SDK twice) and
+    /// zeros. `tsnc` has that of Intel's SDK, 16-64-64 with ReLU: 12 interpolated features in the
+    /// place of four block-compressed textures of three channels, no waves, the level and zeros.
     pub const ALL: [Preset; 14] = [
         preset(
             "default",
@@ -117,12 +139,13 @@ impl Preset {
         ),
         preset(
             "rtxntc",
-            "the layers of NVIDIA's RTX SDK",
-            [(6, 4, 3), (12, 4, 3)],
+            "the synthesizer of NVIDIA's RTX SDK, at 5 bits per texel",
+            [(16, 4, 2), (16, 4, 3)],
             &[64, 48, 32],
             0,
-            GELU,
-        ),
+            GELU_3,
+        )
+        .interpolated(3, WaveForm::Saw, 3),
         preset(
             "ntc-0.2",
             "the NTC paper's lowest rate, without its pyramid",
@@ -157,12 +180,13 @@ impl Preset {
         ),
         preset(
             "tsnc",
-            "the layers of Intel's SDK",
-            [(1, 4, 1), (7, 4, 2)],
+            "the synthesizer of Intel's SDK",
+            [(6, 4, 1), (6, 4, 2)],
             &[64, 64],
             0,
             RELU,
-        ),
+        )
+        .interpolated(0, WaveForm::Triangle, 3),
     ];
 
     /// The preset with this name.
@@ -188,14 +212,21 @@ impl Preset {
                 bits,
                 scale_log2,
             }),
+            sampling: self.sampling,
             hidden: self.hidden.to_vec(),
             residual_blocks: self.residual_blocks,
             layers_per_block: 2,
             activation: self.activation,
-            octaves: if self.name == "tsnc" { 1 } else { 3 },
+            octaves: self.octaves,
+            wave: self.wave,
+            padding: self.padding,
             snap: Snap::Stride,
             address: Address::Wrap,
+            precision: Precision::Int8,
+            precision_per_layer: None,
+            input_bits: 8,
             weight_bits: 8,
+            activation_bits: 8,
             encoder_width: 32,
             crop: 256,
             crops: 4,

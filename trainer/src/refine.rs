@@ -1,13 +1,14 @@
-//! The stages on the whole set: latents and synthesizer, in reals and then in integers.
+//! The stages on the whole set: latents and synthesizer, in reals and then in the numbers of the
+//! decode.
 
 use crate::adam::Rate;
 use crate::calibrate::calibrate;
 use crate::engine::{Engine, View};
 use crate::evaluate::{Errors, evaluate};
-use crate::integer::{Quantised, Range, quantise};
 use crate::latents::Rounding;
 use crate::model::{Ground, Model};
 use crate::network::Network;
+use crate::quantise::{Quantised, Range, Widths, quantise};
 use crate::random::{Purpose, Stream};
 use crate::sampler::{Numbers, Window};
 use crate::schedule::Stage;
@@ -39,13 +40,13 @@ impl Model {
         [&self.latents[0].seen, &self.latents[1].seen]
     }
 
-    /// The integers of the present parameters.
+    /// The numbers that the present parameters become in the decode.
     pub(crate) fn quantised(&self, ground: &Ground<'_>) -> Quantised {
         quantise(
             &ground.topology,
             &self.parameters,
             &self.ranges,
-            ground.config.weight_bits,
+            Widths::of(ground.config),
             ground.outputs(),
         )
     }
@@ -71,7 +72,8 @@ impl Model {
         let network = self.real(ground);
         let windows = [Window::whole(&ground.positions)];
         let view = self.view(ground, &network, Numbers::Real, &windows);
-        calibrate(&ground.topology, view, &texels)
+        let bits = ground.config.activation_bits;
+        calibrate(&ground.topology, view, &texels, bits)
     }
 
     fn view<'v>(
@@ -145,7 +147,7 @@ impl Model {
         loss
     }
 
-    /// The error over every texel, in reals or in the asset's integers.
+    /// The error over every texel, in reals or in the asset's numbers.
     pub(crate) fn evaluate(&mut self, ground: &Ground<'_>, numbers: Numbers) -> Errors {
         self.show(|_| Rounding::Nearest);
         let network = match numbers {

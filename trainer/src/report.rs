@@ -44,7 +44,8 @@ pub struct TrainReport {
     /// Decibels over every texel of every mip and channel (the paper's measure) of the network in
     /// reals with rounded latents, as the refinement left it.
     pub psnr_float: f64,
-    /// The same of the asset: integers throughout, codes compared with the source's reals.
+    /// The same of the asset: the decode's own numbers throughout, codes compared with the source's
+    /// reals.
     pub psnr_quantised: f64,
     /// Decibels of the asset for each channel of mip 0.
     pub psnr_channels: Vec<f64>,

@@ -1,7 +1,8 @@
 //! Sampler: from grids and a texel to the synthesizer's inputs, and the way back for gradients.
 
+use crate::choices::GridSampling;
 use crate::positions::Positions;
-use ntmu_isa::embed::{ACTIVATION_RANGE, INPUT_FRACTION_BITS};
+use ntmu_isa::embed::input_range;
 use ntmu_isa::position::PHASE_BITS;
 
 /// A texel of a batch.
@@ -44,7 +45,7 @@ impl Window {
 pub(crate) enum Numbers {
     /// Reals; nothing is rounded.
     Real,
-    /// Integers of isa's embedding, in units of 1/128, held in floats.
+    /// Integers of isa's embedding, held in floats.
     Integer,
 }
 
@@ -53,8 +54,11 @@ pub(crate) enum Numbers {
 pub(crate) struct Embedding {
     pub(crate) numbers: Numbers,
     pub(crate) channels: [usize; 2],
+    pub(crate) sampling: [GridSampling; 2],
     /// Bits of each grid's latents.
     pub(crate) bits: [u8; 2],
+    /// Bits of an input.
+    pub(crate) input_bits: u8,
     pub(crate) inputs: usize,
 }
 
@@ -65,20 +69,36 @@ impl Embedding {
     pub(crate) fn latent_unit(&self) -> [f32; 2] {
         let input = match self.numbers {
             Numbers::Real => 1.0,
-            Numbers::Integer => f32::from(1_u8 << INPUT_FRACTION_BITS),
+            Numbers::Integer => self.one(),
         };
         self.bits.map(|bits| input / (1_u32 << bits) as f32)
     }
 
+    /// The real 1 in units of an integer input.
+    const fn one(&self) -> f32 {
+        (1_u32 << (self.input_bits - 1)) as f32
+    }
+
+    /// Where the inputs of a grid lie among all of them.
+    fn lanes(&self, grid: usize) -> std::ops::Range<usize> {
+        let count = |g: usize| match self.sampling[g] {
+            GridSampling::Corners => 4 * self.channels[g],
+            GridSampling::Interpolated => self.channels[g],
+        };
+        let start = if grid == 0 { 0 } else { count(0) };
+        start..start + count(grid)
+    }
+
     /// The cells of a texel's four corners in each grid, in the order of
-    /// [`ntmu_isa::position::corner_weights`], as offsets of latents; and those weights, in 1/256.
+    /// [`ntmu_isa::filter::FilterRule::weights`], as offsets of latents; and those weights, in
+    /// 1/256.
     #[inline(always)]
     pub(crate) fn corners(
         &self,
         positions: &Positions,
         windows: &[Window],
         texel: Texel,
-    ) -> ([[usize; 4]; 2], [f32; 4]) {
+    ) -> ([[usize; 4]; 2], [[f32; 4]; 2]) {
         let x = positions.axis(0, texel.x, texel.mip);
         let y = positions.axis(1, texel.y, texel.mip);
         let window = &windows[usize::from(texel.window)];
@@ -94,19 +114,19 @@ impl Embedding {
                 *out = cell * self.channels[g];
             }
         }
-        let (wx, wy) = (f32::from(x.phase[1]), f32::from(y.phase[1]));
-        (
-            out,
+        let weights = [0, 1].map(|g: usize| {
+            let (wx, wy) = (f32::from(x.phase[g]), f32::from(y.phase[g]));
             [
                 (ONE - wx) * (ONE - wy),
                 wx * (ONE - wy),
                 (ONE - wx) * wy,
                 wx * wy,
-            ],
-        )
+            ]
+        });
+        (out, weights)
     }
 
-    /// Writes the inputs of a texel: corners of grid 0, grid 1 interpolated, waves, level.
+    /// Writes the inputs of a texel: grid 0, grid 1, waves, level, zeros.
     ///
     /// `seen` holds the latents in units of their codes, whole cells together.
     #[inline(always)]
@@ -119,30 +139,37 @@ impl Embedding {
         row: &mut [f32],
     ) {
         let (corners, weights) = self.corners(positions, windows, texel);
-        let [c0, c1] = self.channels;
-        let [unit0, unit1] = self.latent_unit();
-        let (concatenated, rest) = row.split_at_mut(4 * c0);
-        for (out, &at) in concatenated.chunks_exact_mut(c0).zip(&corners[0]) {
-            for (out, &latent) in out.iter_mut().zip(&seen[0][at..at + c0]) {
-                *out = self.round(latent * unit0);
+        let units = self.latent_unit();
+        for g in 0..2 {
+            let (channels, unit) = (self.channels[g], units[g]);
+            let row = &mut row[self.lanes(g)];
+            let cells = corners[g].map(|at| &seen[g][at..at + channels]);
+            match self.sampling[g] {
+                GridSampling::Corners => {
+                    for (out, cell) in row.chunks_exact_mut(channels).zip(cells) {
+                        for (out, &latent) in out.iter_mut().zip(cell) {
+                            *out = self.round(latent * unit);
+                        }
+                    }
+                }
+                GridSampling::Interpolated => {
+                    let ([a, b, c, d], w, unit) = (cells, weights[g], unit / (ONE * ONE));
+                    for (i, out) in row.iter_mut().enumerate() {
+                        // Products and sums of integers below 2^15: exact in any order.
+                        let sum = w[0] * a[i] + w[1] * b[i] + w[2] * c[i] + w[3] * d[i];
+                        *out = self.round(sum * unit);
+                    }
+                }
             }
         }
-        let (interpolated, tail) = rest.split_at_mut(c1);
-        let [a, b, c, d] = corners[1].map(|at| &seen[1][at..at + c1]);
-        let unit = unit1 / (ONE * ONE);
-        for (i, out) in interpolated.iter_mut().enumerate() {
-            // Products and sums of integers below 2^15: exact in any order.
-            let sum = weights[0] * a[i] + weights[1] * b[i] + weights[2] * c[i] + weights[3] * d[i];
-            *out = self.round(sum * unit);
-        }
         let scale = match self.numbers {
-            Numbers::Real => 1.0 / f32::from(1_u8 << INPUT_FRACTION_BITS),
+            Numbers::Real => 1.0 / self.one(),
             Numbers::Integer => 1.0,
         };
         positions.tail(
             (texel.x, texel.y, texel.mip),
             scale,
-            &mut tail[..self.inputs - 4 * c0 - c1],
+            &mut row[self.lanes(1).end..self.inputs],
         );
     }
 
@@ -151,40 +178,42 @@ impl Embedding {
     fn round(&self, value: f32) -> f32 {
         match self.numbers {
             Numbers::Real => value,
-            Numbers::Integer => (value + 0.5)
-                .floor()
-                .clamp(ACTIVATION_RANGE.0 as f32, ACTIVATION_RANGE.1 as f32),
-        }
-    }
-
-    /// Adds the gradient of a texel's inputs to the gradient of grid 0's latents, in units of the
-    /// latents' codes up to the factor [`Embedding::latent_unit`].
-    #[inline(always)]
-    pub(crate) fn scatter_corners(&self, corners: &[u32; 4], row: &[f32], gradient: &mut [f32]) {
-        let c0 = self.channels[0];
-        for (d, &at) in row.chunks_exact(c0).zip(corners) {
-            let at = at as usize;
-            for (g, d) in gradient[at..at + c0].iter_mut().zip(d) {
-                *g += d;
+            Numbers::Integer => {
+                let (low, high) = input_range(self.input_bits);
+                (value + 0.5).floor().clamp(low as f32, high as f32)
             }
         }
     }
 
-    /// The same for grid 1.
+    /// Adds the gradient of a texel's inputs to that of a grid's latents, in units of the latents'
+    /// codes up to the factor [`Embedding::latent_unit`].
     #[inline(always)]
-    pub(crate) fn scatter_interpolated(
+    pub(crate) fn scatter(
         &self,
+        grid: usize,
         corners: &[u32; 4],
         weights: &[f32; 4],
         row: &[f32],
         gradient: &mut [f32],
     ) {
-        let [c0, c1] = self.channels;
-        let row = &row[4 * c0..4 * c0 + c1];
-        for (&weight, &at) in weights.iter().zip(corners) {
-            let (weight, at) = (weight / (ONE * ONE), at as usize);
-            for (g, d) in gradient[at..at + c1].iter_mut().zip(row) {
-                *g += weight * d;
+        let channels = self.channels[grid];
+        let row = &row[self.lanes(grid)];
+        match self.sampling[grid] {
+            GridSampling::Corners => {
+                for (d, &at) in row.chunks_exact(channels).zip(corners) {
+                    let at = at as usize;
+                    for (g, d) in gradient[at..at + channels].iter_mut().zip(d) {
+                        *g += d;
+                    }
+                }
+            }
+            GridSampling::Interpolated => {
+                for (&weight, &at) in weights.iter().zip(corners) {
+                    let (weight, at) = (weight / (ONE * ONE), at as usize);
+                    for (g, d) in gradient[at..at + channels].iter_mut().zip(row) {
+                        *g += weight * d;
+                    }
+                }
             }
         }
     }

@@ -11,7 +11,8 @@ pub enum Stage {
     Encoder,
     /// Latents and synthesizer on the whole set.
     Refine,
-    /// Latents and the integer synthesizer.
+    /// Latents and the synthesizer as the unit computes it: in integers, or in fp16 where the layers
+    /// are.
     Integer,
 }
 

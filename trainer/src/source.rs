@@ -15,7 +15,8 @@ pub struct Source {
     /// Reals by `[channel, row, column]`, mip 0 first. Mip m has `max(size >> m, 1)` texels along
     /// an axis. A channel that leaves as unorm holds 0..=1, one that leaves as snorm −1..=1.
     pub mips: Vec<Array3<f32>>,
-    /// How each channel leaves the unit: its code is the real times the format's largest code.
+    /// How each channel leaves the unit: its code is the real times the format's largest code, so
+    /// not as `Float16`.
     pub outputs: Vec<OutputFormat>,
     /// The maps, in channel order; together they hold every channel once.
     pub maps: Vec<Map>,
@@ -55,6 +56,13 @@ impl Source {
                 "mips",
                 self.mips.len(),
                 format!("1..={longest}"),
+            ));
+        }
+        if self.outputs.contains(&OutputFormat::Float16) {
+            return Err(TrainError::source(
+                "outputs",
+                OutputFormat::Float16.name(),
+                "unorm8, unorm16 or snorm8",
             ));
         }
         if self.outputs.len() != channels {

@@ -54,13 +54,19 @@ impl Workspace {
             let input = before.last().unwrap_or(&self.inputs);
             let shape = layer.shape;
             let (depth, columns) = (shape.inputs, shape.columns());
+            let start = layer.sums_start_with();
+            if let Some(bias) = start {
+                for row in out.chunks_exact_mut(columns) {
+                    row.copy_from_slice(bias);
+                }
+            }
             product(
                 (input, shape.rows()),
                 &layer.weights,
                 out,
                 depth,
                 columns,
-                false,
+                start.is_some(),
             );
             let source = shape.skip.map(|span| before[index - span].as_slice());
             layer.finish(network.activation, source, out, &mut self.slopes[index]);

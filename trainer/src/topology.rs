@@ -1,6 +1,7 @@
 //! Topology: the layers of a synthesizer and where their parameters lie in one flat slice.
 
-use crate::config::{ActivationKind, TrainConfig};
+use crate::choices::{ActivationKind, Precision};
+use crate::config::TrainConfig;
 use crate::kernel::padded;
 
 /// One layer's sizes.
@@ -8,6 +9,8 @@ use crate::kernel::padded;
 pub(crate) struct LayerShape {
     pub(crate) inputs: usize,
     pub(crate) outputs: usize,
+    /// The arithmetic of the decode.
+    pub(crate) precision: Precision,
     /// Whether the activation follows; otherwise the identity.
     pub(crate) activated: bool,
     /// How many layers a skip path that ends here spans.
@@ -66,7 +69,20 @@ impl Topology {
             }
         }
         topology.push(width, channels, false, None);
+        for (index, layer) in topology.layers.iter_mut().enumerate() {
+            layer.precision = config.precision_of(index);
+        }
         topology
+    }
+
+    /// Whether the register that a layer writes holds halves: an integer layer reads integers,
+    /// which an fp16 layer before it has to give.
+    pub(crate) fn writes_halves(&self, layer: usize) -> bool {
+        let halves = |at: usize| {
+            let layer = self.layers.get(at);
+            layer.is_some_and(|l| l.precision == Precision::Fp16)
+        };
+        halves(layer) && halves(layer + 1)
     }
 
     fn push(&mut self, inputs: usize, outputs: usize, activated: bool, skip: Option<usize>) {
@@ -76,6 +92,7 @@ impl Topology {
         self.layers.push(LayerShape {
             inputs,
             outputs,
+            precision: Precision::Int8,
             activated,
             skip,
             weights_at,

@@ -7,6 +7,7 @@ use crate::error::TrainError;
 use crate::evaluate::decibels;
 use crate::export;
 use crate::model::{Ground, Model};
+use crate::quantise::Widths;
 use crate::refine::Rates;
 use crate::report::{Progress, StageReport, TrainReport, Trained};
 use crate::sampler::Numbers;
@@ -222,7 +223,8 @@ impl Run<'_> {
         } = self;
         let psnr_quantised = decibels(errors.overall());
         let quantised = model.quantised(&ground);
-        let layers = export::layers(&quantised.network, &model.ranges)?;
+        let widths = Widths::of(ground.config);
+        let layers = export::layers(&quantised.network, &model.ranges, widths)?;
         let codes = [model.latents[0].codes(), model.latents[1].codes()];
         let batch = schedule::batch(ground.config, ground.texels.count());
         let record = record(

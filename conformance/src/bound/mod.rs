@@ -7,10 +7,18 @@
 //! * [`typical`]: end to end, expected. The variance of every rounding is propagated to the channel
 //!   by the derivative of the channel with respect to it.
 //!
-//! All in LSB of the value that is bounded. A saturation is monotone and never increases a distance,
-//! so clamps on both sides need no term of their own.
+//! All in LSB of the value that is bounded; reals of fp16 layers in units of one, where a rounding
+//! moves a number by half the distance to its neighbour ([`float`]). A saturation is monotone and
+//! never increases a distance, so clamps on both sides need no term of their own.
+//!
+//! An accumulator that overflows, and an fp16 sum that saturates on its way (`fused`), is no
+//! rounding: the bounds hold where none does.
 
+pub mod float;
+mod interpolation;
+mod range;
 pub mod stage;
+mod table;
 pub mod typical;
 pub mod worst;
 
@@ -85,15 +93,20 @@ fn gate(argument: f64) -> f64 {
     argument * (2.0 * argument + 768.0).clamp(0.0, 1536.0)
 }
 
+/// The largest argument: of 16 bits, or 3.
+fn gate_high(is_clamped: bool) -> f64 {
+    if is_clamped { 768.0 } else { 32_767.0 }
+}
+
 /// How far a gate's product moves, at most, when its argument moves by `error`.
 ///
 /// Between −384 and −192 the product falls, above it rises, below it is zero; so the extremes over
-/// an interval are at its ends or at −192. Arguments are clamped to 16 bits.
-fn gate_error(argument: f64, error: f64) -> f64 {
-    let low = (argument - error).clamp(-32_768.0, 32_767.0);
-    let high = (argument + error).clamp(-32_768.0, 32_767.0);
+/// an interval are at its ends or at −192. Arguments are clamped to 16 bits, or to 3.
+fn gate_error(argument: f64, error: f64, is_clamped: bool) -> f64 {
+    let limit = |x: f64| x.clamp(-32_768.0, gate_high(is_clamped));
+    let (low, high) = (limit(argument - error), limit(argument + error));
     let lowest = (-192.0_f64).clamp(low, high);
-    let from = gate(argument.clamp(-32_768.0, 32_767.0));
+    let from = gate(limit(argument));
     [low, lowest, high]
         .iter()
         .map(|&at| (gate(at) - from).abs())
@@ -134,7 +147,7 @@ mod tests {
                 let moved = walk
                     .map(|at| (gate(at) - gate(argument)).abs())
                     .fold(0.0, f64::max);
-                let bound = gate_error(argument, error);
+                let bound = gate_error(argument, error, false);
                 // A walk of 513 points misses the lowest point by 200/256 at most, and the product
                 // is curved by 4 there.
                 assert!(bound >= moved && bound - moved <= 2.0 * (200.0 / 256.0_f64).powi(2));

@@ -1,8 +1,10 @@
 //! Suites: the vectors themselves, made from nothing but the specification and fixed seeds.
 
+mod arithmetics;
 pub mod container;
 pub mod position;
 pub mod refuse;
+mod refuse_layers;
 pub mod rescale;
 mod subjects;
 pub mod texel;

@@ -1,13 +1,13 @@
-//! The refuse suite: bytes that are no asset, and two that are.
+//! The refuse suite: bytes that are no asset, and three that are.
 
 use super::SuiteError;
 use super::container::{Container, seal};
+use super::refuse_layers::{half_fields, layer_fields};
 use crate::emit::Builder;
 use crate::flag::{self, Flag};
-use crate::synthetic::{self, Spec, grid};
+use crate::synthetic::{self, Spec, corners, interpolated};
 use crate::vector::{Answer, OpenQuery, Query, VectorFile};
 use ntmu_isa::Asset;
-use ntmu_isa::layer::Layer;
 
 /// Every so many bytes, one bit is flipped; prime, so that all bit positions occur.
 const FLIP_STEP: usize = 11;
@@ -19,13 +19,7 @@ const FLIP_STEP: usize = 11;
 pub fn suite() -> Result<VectorFile, SuiteError> {
     let about = "files that a reader must refuse, and a few that it must accept";
     let mut builder = Builder::new("refuse", about);
-    let mut spec = Spec::small(8, 8);
-    spec.shape.grids = [grid(1, 3, 3), grid(1, 4, 3)];
-    (spec.hidden, spec.block_span, spec.weight_bits) = (vec![2], 1, 7);
-    let asset = synthetic::asset(&spec, 1).map_err(|error| SuiteError::Asset {
-        name: "refuse".to_owned(),
-        error,
-    })?;
+    let asset = asset(Spec::small(8, 8).with_bits(7, 8))?;
     let file = asset.to_bytes();
     let Some(container) = Container::parse(&file) else {
         return Ok(builder.build());
@@ -47,7 +41,30 @@ pub fn suite() -> Result<VectorFile, SuiteError> {
     damaged(&mut builder, &file);
     table(&mut builder, &container);
     fields(&mut builder, &container, &asset);
+    let halves = asset_of_halves()?;
+    if let Some(container) = Container::parse(&halves.to_bytes()) {
+        accepted(
+            &mut builder,
+            "an asset of fp16 layers",
+            container.to_bytes(),
+        );
+        half_fields(&mut builder, &container, &halves);
+    }
     Ok(builder.build())
+}
+
+/// A small asset: three layers, the second with a skip path.
+fn asset(mut spec: Spec) -> Result<Asset, SuiteError> {
+    spec.shape.grids = [corners(1, 3, 3), interpolated(1, 4, 3)];
+    (spec.hidden, spec.block_span) = (vec![2], 1);
+    synthetic::asset(&spec, 1).map_err(|error| SuiteError::Asset {
+        name: "refuse".to_owned(),
+        error,
+    })
+}
+
+fn asset_of_halves() -> Result<Asset, SuiteError> {
+    asset(Spec::small(8, 8).with_halves())
 }
 
 fn accepted(builder: &mut Builder, comment: &str, ntx: Vec<u8>) {
@@ -187,33 +204,80 @@ fn fields(builder: &mut Builder, container: &Container, asset: &Asset) {
         9,
         &[2],
     );
-    change("snap 2", range, "SHAP", 10, &[2]);
-    change("address mode 3", range, "SHAP", 11, &[3]);
-    change("grid 0 without channels", range, "SHAP", 12, &[0, 0]);
-    change("grid 0 with 65535 channels", range, "SHAP", 12, &[255, 255]);
-    change("grid 0 of 0 bits", range, "SHAP", 14, &[0]);
-    change("grid 0 of 9 bits", range, "SHAP", 14, &[9]);
-    change("grid 0 at full resolution", range, "SHAP", 15, &[0]);
-    change("grid 1 at 1/16", range, "SHAP", 19, &[4]);
-    change("no channels", range, "SHAP", 20, &[0, 0]);
-    change("17 channels", range, "SHAP", 20, &[17, 0]);
-    change("output format 3", range, "SHAP", 22, &[3]);
-    for (at, name, count) in [
-        (0, "input", 4),
-        (1, "leak", 4),
-        (2, "requantize", 5),
-        (3, "skip", 5),
-        (4, "output", 5),
+    for (at, name, codes) in [(10, "wave", 2), (13, "snap", 2), (14, "address mode", 3)] {
+        change(&format!("{name} {codes}"), range, "SHAP", at, &[codes]);
+    }
+    change("sixteen zeros of padding", range, "SHAP", 11, &[16]);
+    change(
+        "padding where the layer has no inputs for it",
+        clash,
+        "SHAP",
+        11,
+        &[1],
+    );
+    change("inputs of three bits", range, "SHAP", 12, &[3]);
+    change("inputs of 17 bits", range, "SHAP", 12, &[17]);
+    change("a reserved bit of the shape", reserved, "SHAP", 15, &[1]);
+    change("grid 0 without channels", range, "SHAP", 16, &[0, 0]);
+    change("grid 0 with 65535 channels", range, "SHAP", 16, &[255, 255]);
+    change("grid 0 of 0 bits", range, "SHAP", 18, &[0]);
+    change("grid 0 of 9 bits", range, "SHAP", 18, &[9]);
+    change("grid 0 at full resolution", range, "SHAP", 19, &[0]);
+    change("sampling 2 of grid 0", range, "SHAP", 20, &[2]);
+    change("a reserved bit of grid 0", reserved, "SHAP", 21, &[1]);
+    change("grid 1 at 1/16", range, "SHAP", 25, &[4]);
+    change(
+        "grid 1 by its corners where the layer has inputs for one",
+        clash,
+        "SHAP",
+        26,
+        &[0],
+    );
+    change("no channels", range, "SHAP", 28, &[0, 0]);
+    change("17 channels", range, "SHAP", 28, &[17, 0]);
+    change("output format 4", range, "SHAP", 30, &[4]);
+    for (at, name, codes) in [
+        (2, "coordinate", 4),
+        (3, "point snap", 2),
+        (4, "filter", 4),
+        (5, "filter rounding", 4),
+        (6, "interpolate", 4),
+        (7, "input", 4),
+        (9, "overflow", 2),
+        (11, "leak", 4),
+        (12, "requantize", 5),
+        (13, "skip", 5),
+        (15, "output", 5),
+        (16, "sum", 4),
+        (17, "convert", 4),
     ] {
         change(
-            &format!("profile {name} {count}"),
+            &format!("profile {name} {codes}"),
             range,
             "PROF",
             at,
-            &[count],
+            &[codes],
         );
     }
-    change("a reserved bit of the profile", reserved, "PROF", 7, &[1]);
+    for (at, name, low, high) in [
+        (0, "subtexel bits", 4, 12),
+        (1, "lod bits", 4, 8),
+        (8, "accumulator bits", 16, 32),
+        (10, "bias bits", 8, 32),
+        (14, "residual bits", 8, 32),
+    ] {
+        for found in [low - 1, high + 1] {
+            change(
+                &format!("profile {name} {found}"),
+                range,
+                "PROF",
+                at,
+                &[found],
+            );
+        }
+    }
+    change("biases beyond the profile's bits", clash, "PROF", 10, &[8]);
+    change("a reserved bit of the profile", reserved, "PROF", 18, &[1]);
     // One cell of one latent of 3 bits: five bits of the byte are filling.
     let codes = container.body("GRD0")[0];
     change(
@@ -223,77 +287,7 @@ fn fields(builder: &mut Builder, container: &Container, asset: &Asset) {
         0,
         &[codes | 8],
     );
-    change("no layers", range, "WGTS", 0, &[0, 0]);
-    change("65 layers", range, "WGTS", 0, &[65, 0]);
-    change("a layer fewer than there are", clash, "WGTS", 0, &[2, 0]);
-    change("weights of one bit", range, "WGTS", 2, &[1]);
-    change("weights of nine bits", range, "WGTS", 2, &[9]);
-    change("a reserved bit of the weights", reserved, "WGTS", 3, &[1]);
-    change(
-        "an input more than there are",
-        clash,
-        "WGTS",
-        4,
-        &[asset.layers[0].inputs as u8 + 1],
-    );
-    change("1025 outputs", range, "WGTS", 6, &[1, 4]);
-    change("a zero point of 128", range, "WGTS", 8, &[128, 0]);
-    change("a zero point of -129", range, "WGTS", 8, &[127, 255]);
-    change("activation 4", range, "WGTS", 10, &[4]);
-    change("a leak of 2^-8", range, "WGTS", 10, &[2, 8]);
-    change("a leak of 2^0", range, "WGTS", 10, &[2, 0]);
-    change("a leak where nothing leaks", reserved, "WGTS", 11, &[1]);
-    change(
-        "a gate's scale where there is no gate",
-        reserved,
-        "WGTS",
-        12,
-        &[1],
-    );
-    change("a skip path into the first layer", clash, "WGTS", 17, &[1]);
-    change(
-        "a mantissa of 2^30 - 1",
-        range,
-        "WGTS",
-        23,
-        &[255, 255, 255, 63],
-    );
-    change("a negative mantissa", range, "WGTS", 26, &[128]);
-    change("a shift of 1", range, "WGTS", 27, &[1]);
-    change("a shift of 63", range, "WGTS", 27, &[63]);
-    change("a bias of 2^30", range, "WGTS", 28, &[0, 0, 0, 64]);
-    change("a bias of -2^30", range, "WGTS", 28, &[0, 0, 0, 192]);
-    let second = 4 + layer_bytes(&asset.layers[0], asset.weight_bits);
-    change(
-        "a skip path of four layers",
-        range,
-        "WGTS",
-        second + 13,
-        &[4],
-    );
-    change(
-        "a skip path from before the first layer",
-        clash,
-        "WGTS",
-        second + 13,
-        &[2],
-    );
-    let last = second + layer_bytes(&asset.layers[1], asset.weight_bits);
-    change(
-        "a zero point in the last layer",
-        range,
-        "WGTS",
-        last + 4,
-        &[1],
-    );
-    change("a ReLU in the last layer", range, "WGTS", last + 6, &[1]);
-    change(
-        "a skip path into the last layer",
-        range,
-        "WGTS",
-        last + 13,
-        &[1],
-    );
+    layer_fields(&mut change, asset);
     let name = asset.metadata.name.len();
     change("a name that is not UTF-8", range, "META", 4, &[255]);
     change("a name of 2^24 bytes more", range, "META", 3, &[1]);
@@ -318,10 +312,4 @@ fn fields(builder: &mut Builder, container: &Container, asset: &Asset) {
     );
     change("encoding 4", range, "META", map + 11, &[4]);
     change("a bit depth of 9", range, "META", map + 12, &[9]);
-}
-
-/// Bytes of a layer in the section of weights.
-fn layer_bytes(layer: &Layer, weight_bits: u8) -> usize {
-    let weights = usize::from(layer.inputs) * usize::from(layer.outputs);
-    19 + 9 * usize::from(layer.outputs) + (weights * usize::from(weight_bits)).div_ceil(8)
 }

@@ -1,7 +1,7 @@
 //! The assets of the texel suite, each there for one family of rules.
 
 use crate::flag::{self, Flag};
-use crate::synthetic::{Spec, SpecActivation, SpecScale, grid};
+use crate::synthetic::{Spec, SpecActivation, SpecScale, corners, interpolated};
 use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
 use ntmu_isa::rescale::Requantizer;
@@ -35,7 +35,8 @@ pub(super) fn subjects() -> Vec<Subject> {
         // Sixteen bits show a hidden LSB that eight would round away.
         spec.shape.outputs = vec![OutputFormat::Unorm16, OutputFormat::Snorm8];
         // Small weights drop few bits, so that ties are frequent.
-        (spec.scale, spec.weight_bits) = (SpecScale::PowerOfTwo, 3);
+        spec.scale = SpecScale::PowerOfTwo;
+        spec = spec.with_bits(3, 8);
         spec.activation = activation;
         Subject {
             name,
@@ -63,7 +64,7 @@ pub(super) fn subjects() -> Vec<Subject> {
     let deep = Spec {
         shape: Shape {
             snap: CornerSnap::Stride,
-            grids: [grid(1, 4, 3), grid(2, 3, 3)],
+            grids: [corners(1, 4, 3), interpolated(2, 3, 3)],
             octaves: 0,
             ..Spec::small(128, 64).shape
         },
@@ -91,17 +92,21 @@ pub(super) fn subjects() -> Vec<Subject> {
     let odd = Spec {
         shape: Shape {
             address_mode: AddressMode::Mirror,
-            grids: [grid(2, 1, 2), grid(1, 7, 1)],
+            grids: [corners(2, 1, 2), interpolated(1, 7, 1)],
             octaves: 3,
             outputs: OutputFormat::ALL.to_vec(),
             ..Spec::small(37, 21).shape
         },
-        weight_bits: 2,
         activation: leaky,
-        ..Spec::small(37, 21)
+        ..Spec::small(37, 21).with_bits(2, 8)
     };
     let comment = "no size is a power of two, mirror, weights of two bits, all output formats";
-    let flags = &[flag::SKIP_PATH, flag::LEAK, flag::NON_POWER_OF_TWO];
+    let flags = &[
+        flag::SKIP_PATH,
+        flag::LEAK,
+        flag::NON_POWER_OF_TWO,
+        flag::FLOAT_OUTPUT,
+    ];
     subjects.push(Subject {
         name: "odd",
         comment,
@@ -111,7 +116,7 @@ pub(super) fn subjects() -> Vec<Subject> {
 
     let eight = Spec {
         shape: Shape {
-            grids: [grid(3, 8, 3), grid(3, 8, 2)],
+            grids: [corners(3, 8, 3), interpolated(3, 8, 2)],
             ..Spec::small(24, 24).shape
         },
         profile: Profile {
@@ -248,5 +253,6 @@ pub(super) fn subjects() -> Vec<Subject> {
     ];
     narrow.spec.scale = SpecScale::BelowTies;
     subjects.push(narrow);
+    subjects.extend(super::arithmetics::subjects());
     subjects
 }

@@ -4,11 +4,15 @@ use super::SuiteError;
 use super::subjects::{Subject, subjects};
 use crate::emit::Builder;
 use crate::flag::{self, Flag};
+use crate::naive;
 use crate::stage;
 use crate::synthetic::{self, Random};
 use crate::vector::{Answer, TexelQuery, VectorFile};
+use ntmu_isa::accumulate::Overflow;
+use ntmu_isa::filter::FilterRule;
+use ntmu_isa::half::SumOrder;
 use ntmu_isa::layout::Layout;
-use ntmu_isa::profile::Profile;
+use ntmu_isa::profile::{NamedProfile, Profile};
 use ntmu_isa::rescale::Requantizer;
 use ntmu_isa::round::Rounding;
 use ntmu_isa::shape::Shape;
@@ -66,6 +70,8 @@ fn decode(builder: &mut Builder, subject: &Subject, asset: &Asset) {
         flags.extend(place.flag);
         flags.extend(is_seam.then_some(flag::SEAM));
         flags.extend(is_deep.then_some(flag::DEEP_MIP));
+        let overflows = naive::texel(asset, request).overflows;
+        flags.extend((!overflows.is_empty()).then_some(flag::OVERFLOW));
         if flags.is_empty() {
             flags.push(flag::PLAIN);
         }
@@ -117,7 +123,7 @@ fn separate(asset: &Asset, decoder: &Decoder<'_>, places: &mut Vec<Place>) {
     for (rule, profile) in neighbours(asset.profile) {
         let mut parts = asset.clone().into_parts();
         parts.profile = profile;
-        // A profile is no part of what is validated.
+        // A bias may be too wide for another accumulator.
         let Ok(other) = Asset::new(parts) else {
             continue;
         };
@@ -139,47 +145,35 @@ fn separate(asset: &Asset, decoder: &Decoder<'_>, places: &mut Vec<Place>) {
     }
 }
 
-/// Every profile that differs from this one in one rule, and that difference in words.
+/// Every profile that differs from this one in one rule, and that difference in words; then the
+/// named profiles, which differ in several.
 fn neighbours(profile: Profile) -> Vec<(String, Profile)> {
     let mut neighbours = Vec::new();
-    for mode in Rounding::ALL {
-        let name = mode.name();
-        neighbours.push((
-            format!("input {name}"),
-            Profile {
-                input: mode,
-                ..profile
-            },
-        ));
-        neighbours.push((
-            format!("leak {name}"),
-            Profile {
-                leak: mode,
-                ..profile
-            },
-        ));
-    }
-    for requantizer in Requantizer::ALL {
-        let name = requantizer.name();
-        let with = Profile {
-            requantize: requantizer,
-            ..profile
+    let mut add = |name: String, neighbour| neighbours.push((name, neighbour));
+    macro_rules! each {
+        ($rule:literal, $all:expr, $($field:ident).+) => {
+            for choice in $all {
+                let mut other = profile;
+                other.$($field).+ = choice;
+                add(format!(concat!($rule, " {}"), choice.name()), other);
+            }
         };
-        neighbours.push((format!("requantize {name}"), with));
-        neighbours.push((
-            format!("skip {name}"),
-            Profile {
-                skip: requantizer,
-                ..profile
-            },
-        ));
-        neighbours.push((
-            format!("output {name}"),
-            Profile {
-                output: requantizer,
-                ..profile
-            },
-        ));
+    }
+    each!("interpolate", FilterRule::ALL, interpolate);
+    each!("input", Rounding::ALL, input);
+    each!("overflow", Overflow::ALL, accumulator.overflow);
+    each!("leak", Rounding::ALL, leak);
+    each!("requantize", Requantizer::ALL, requantize);
+    each!("skip", Requantizer::ALL, skip);
+    each!("output", Requantizer::ALL, output);
+    each!("sum", SumOrder::ALL, sum);
+    each!("convert", Rounding::ALL, convert);
+    let mut other = profile;
+    (other.accumulator.bits, other.residual_bits) = (32, 32);
+    add("full widths".to_owned(), other);
+    // The built-in profiles are read without an error.
+    for named in NamedProfile::all().unwrap_or_default() {
+        add(format!("profile {}", named.name), named.profile);
     }
     neighbours.retain(|(_, neighbour)| *neighbour != profile);
     neighbours

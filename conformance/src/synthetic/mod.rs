@@ -1,23 +1,25 @@
 //! Synthetic: assets that exercise every rule, from a [`Spec`] and a seed.
 //!
-//! Codes and weights are random. Biases, scales and zero points are then fitted layer by layer to
+//! Codes and weights are random. Biases, scales, tables and zero points are then fitted layer by layer to
 //! what the oracle finds at a sample of texels, so that activations use their range, some saturate,
 //! and no channel is constant where the inputs are not. Same spec and seed, same asset: the fit
 //! uses only `+ − × ÷` of `f64`, which IEEE 754 defines to the bit.
 
+mod arbitrary;
+mod fit;
 mod random;
 mod spec;
 
+pub use arbitrary::arbitrary_spec;
 pub use random::Random;
-pub use spec::{Spec, SpecActivation, SpecScale, arbitrary_spec, grid};
+pub use spec::{Spec, SpecActivation, SpecKind, SpecScale, corners, interpolated};
 
-use crate::oracle::{embed, synthesizer};
-use ntmu_isa::activation::Activation;
+use crate::oracle::embed;
+use crate::oracle::synthesizer::{Source, activated, bias, outputs, reading, weights};
 use ntmu_isa::asset::{Encoding, Map, Metadata, Parts};
-use ntmu_isa::layer::{Layer, Skip};
+use ntmu_isa::layer::Layer;
 use ntmu_isa::limits;
-use ntmu_isa::rescale::Multiplier;
-use ntmu_isa::shape::{OutputFormat, Shape};
+use ntmu_isa::shape::{LaneFormat, OutputFormat, Shape};
 use ntmu_isa::{Asset, AssetError};
 use ntmu_model::Request;
 
@@ -59,29 +61,37 @@ pub fn asset(spec: &Spec, seed: u64) -> Result<Asset, AssetError> {
         shape,
         profile: spec.profile,
         grids,
-        weight_bits: spec.weight_bits,
         layers,
     })
 }
 
 /// Refuses what an asset may not have and what the making of one would stumble over.
 fn check(spec: &Spec) -> Result<(), AssetError> {
-    let (low, high) = limits::WEIGHT_BITS;
+    let weight = limits::WEIGHT_BITS;
+    let lane = limits::LANE_BITS;
     let most = i32::from(limits::MAX_LANES);
     let layers = spec.hidden.len() as i32 + i32::from(spec.blocks) * i32::from(spec.block_span) + 1;
-    let ranges = [
-        (
-            "weight_bits",
-            i32::from(spec.weight_bits),
-            (i32::from(low), i32::from(high)),
-        ),
-        (
-            "block_span",
-            i32::from(spec.block_span),
-            (1, i32::from(limits::MAX_SKIP_SPAN)),
-        ),
+    let span = (1, i32::from(limits::MAX_SKIP_SPAN));
+    let mut ranges = vec![
+        ("block_span", i32::from(spec.block_span), span),
         ("layers", layers, (1, i32::from(limits::MAX_LAYERS))),
+        ("reach", i32::from(spec.reach), (-12, 15)),
     ];
+    let mut bits = |name, found: u8, (low, high): (u8, u8)| {
+        ranges.push((name, i32::from(found), (i32::from(low), i32::from(high))));
+    };
+    for &kind in &spec.kinds {
+        match kind {
+            SpecKind::Integer {
+                weight_bits,
+                output_bits,
+            } => {
+                bits("weight_bits", weight_bits, weight);
+                bits("output_bits", output_bits, lane);
+            }
+            SpecKind::Half { quantize } => bits("quantize", quantize.unwrap_or(8), lane),
+        }
+    }
     let widths = spec
         .hidden
         .iter()
@@ -95,17 +105,26 @@ fn check(spec: &Spec) -> Result<(), AssetError> {
             });
         }
     }
-    // `Asset::new` checks the shape first; grids that are left out make it stop right after.
-    let parts = Parts {
-        shape: spec.shape.clone(),
-        profile: spec.profile,
-        grids: [Vec::new(), Vec::new()],
-        weight_bits: spec.weight_bits,
-        layers: Vec::new(),
-        metadata: Metadata::default(),
+    // `Asset::new` checks the shape first; grids that are left out make it stop right after. So the
+    // profile is checked with an asset of one texel.
+    let refused = |shape: &Shape, grids| {
+        Asset::new(Parts {
+            shape: shape.clone(),
+            profile: spec.profile,
+            grids,
+            layers: Vec::new(),
+            metadata: Metadata::default(),
+        })
     };
-    match Asset::new(parts) {
-        Err(AssetError::Field { field, .. }) if field.starts_with("grid") => Ok(()),
+    match refused(&spec.shape, [Vec::new(), Vec::new()]) {
+        Err(AssetError::Field { field, .. }) if field.starts_with("grid") => {}
+        Err(error) => return Err(error),
+        Ok(_) => {}
+    }
+    let tiny = Spec::small(1, 1).shape;
+    let zeros = [0, 1].map(|grid| vec![0; tiny.grid_latents(grid) as usize]);
+    match refused(&tiny, zeros) {
+        Err(AssetError::Field { field, .. }) if field.starts_with("weights") => Ok(()),
         Err(error) => Err(error),
         Ok(_) => Ok(()),
     }
@@ -129,42 +148,63 @@ fn synthesizer(spec: &Spec, grids: &[Vec<u8>; 2], random: &mut Random) -> Vec<La
     // Per sample, the inputs and then the outputs of every layer so far.
     let mut values: Vec<Vec<Vec<f64>>> = samples
         .iter()
-        .map(|&request| vec![embed::inputs(&spec.shape, grids, request)])
+        .map(|&request| vec![embed::inputs(&spec.shape, &spec.profile, grids, request)])
         .collect();
     let mut layers: Vec<Layer> = Vec::new();
     let plan = plan(spec);
     for (index, &(width, span)) in plan.iter().enumerate() {
-        let is_last = index + 1 == plan.len();
-        let inputs = values[0][index].len();
-        let mut layer = Layer {
-            inputs: inputs as u16,
-            outputs: width,
-            weights: weights(spec.weight_bits, inputs, usize::from(width), random),
-            bias: Vec::new(),
-            scales: Vec::new(),
-            zero_point: 0,
-            activation: Activation::Identity,
-            skip: None,
+        let before = layers.last().map(Layer::output_format);
+        let place = fit::Place {
+            spec,
+            index,
+            inputs: values[0][index].len(),
+            rows: usize::from(width),
+            input: before.unwrap_or(spec.shape.input_format()),
+            is_last: index + 1 == plan.len(),
+            // values[n + 1] are layer n's outputs, so the source of a span is at index + 1 − span.
+            source: span.map(|span| (span, layers[index - usize::from(span)].output_format())),
         };
-        let sums: Vec<Vec<f64>> = values.iter().map(|v| products(&layer, &v[index])).collect();
-        if is_last {
-            fit_output(spec, &mut layer, &sums, random);
-        } else {
-            fit_hidden(spec, &mut layer, &sums, span, random);
-            for (sample, sums) in values.iter_mut().zip(&sums) {
-                let biased = sums.iter().zip(&layer.bias).map(|(s, &b)| s + f64::from(b));
-                let activated = synthesizer::activated(&layer, &biased.collect::<Vec<_>>());
-                // values[n + 1] are layer n's outputs, so the source of a span is at index + 1 − span.
-                let source = span.map(|span| index + 1 - usize::from(span));
-                let source =
-                    source.map(|at| (sample[at].as_slice(), f64::from(layers[at - 1].zero_point)));
-                let outputs = synthesizer::outputs(&layer, &activated, source);
-                sample.push(outputs);
+        let registers: Vec<&[f64]> = values
+            .iter()
+            .map(|sample| sample[index].as_slice())
+            .collect();
+        let layer = fit::layer(&place, &registers, random);
+        if !place.is_last {
+            for sample in &mut values {
+                let sums = sums(&layer, place.input, &sample[index]);
+                let source = layer.skip.map(|skip| {
+                    let from = index - usize::from(skip.span);
+                    let zero_point = match layers[from].output_format() {
+                        LaneFormat::Integer { zero_point, .. } => f64::from(zero_point),
+                        LaneFormat::Half => 0.0,
+                    };
+                    Source {
+                        values: &sample[from + 1],
+                        zero_point,
+                    }
+                });
+                let active = activated(&layer, &sums);
+                let made = outputs(&layer, &spec.profile, &active, source);
+                sample.push(made);
             }
         }
         layers.push(layer);
     }
     layers
+}
+
+/// bias + Σ weight · input, of a register in this format.
+fn sums(layer: &Layer, format: LaneFormat, register: &[f64]) -> Vec<f64> {
+    let (zero_point, one) = reading(layer, format).unwrap_or((0.0, 1.0));
+    (0..usize::from(layer.outputs))
+        .map(|row| {
+            let products = weights(layer, row);
+            let products = products.iter().zip(register);
+            products.fold(bias(layer, row), |sum, (w, x)| {
+                sum + w * ((x - zero_point) / one)
+            })
+        })
+        .collect()
 }
 
 /// Texels from all over the chain.
@@ -177,99 +217,4 @@ fn sample(shape: &Shape, random: &mut Random) -> Vec<Request> {
             Request::new(shape, x, random.within(0, height as i32 - 1) as u32, mip).ok()
         })
         .collect()
-}
-
-fn weights(bits: u8, inputs: usize, rows: usize, random: &mut Random) -> Vec<i8> {
-    let largest = (1 << (bits - 1)) - 1;
-    let mut weights: Vec<i8> = (0..inputs * rows)
-        .map(|_| random.within(-largest - 1, largest) as i8)
-        .collect();
-    for row in weights.chunks_exact_mut(inputs) {
-        // A row of zeros would be a constant.
-        if row.iter().all(|&w| w == 0) {
-            row[0] = 1;
-        }
-    }
-    weights
-}
-
-fn products(layer: &Layer, input: &[f64]) -> Vec<f64> {
-    let rows = (0..usize::from(layer.outputs)).map(|row| layer.row(row));
-    rows.map(|row| row.iter().zip(input).map(|(&w, x)| f64::from(w) * x).sum())
-        .collect()
-}
-
-/// The middle of a row's sums over the samples, and how far they reach from it; at least 1.
-fn spread(sums: &[Vec<f64>], row: usize) -> (f64, f64) {
-    let of_row = || sums.iter().map(|sums| sums[row]);
-    let low = of_row().fold(f64::INFINITY, f64::min);
-    let high = of_row().fold(f64::NEG_INFINITY, f64::max);
-    ((low + high) / 2.0, ((high - low) / 2.0).max(1.0))
-}
-
-fn fit_hidden(
-    spec: &Spec,
-    layer: &mut Layer,
-    sums: &[Vec<f64>],
-    span: Option<u8>,
-    random: &mut Random,
-) {
-    // A skip path brings its own share of the range.
-    let share = if span.is_some() { 0.6 } else { 1.0 };
-    // The gate's product reaches 3·256·1536 where its argument does reach 3.
-    let gate = multiplier(spec, share * 220.0 / (768.0 * 1536.0));
-    let (zero_point, activation) = match spec.activation {
-        SpecActivation::Identity => (random.within(-16, 16), Activation::Identity),
-        SpecActivation::Relu => (-128, Activation::Relu),
-        SpecActivation::Leaky(shift) => (-90, Activation::Leaky { shift }),
-        SpecActivation::HardGelu => (-112, Activation::HardGelu { scale: gate }),
-    };
-    (layer.zero_point, layer.activation) = (zero_point as i16, activation);
-    layer.skip = span.map(|span| Skip {
-        span,
-        scale: multiplier(spec, 0.4 + 0.5 * random.unit()),
-    });
-    for row in 0..usize::from(layer.outputs) {
-        let (middle, reach) = spread(sums, row);
-        let bias = -middle + reach * (random.unit() - 0.4) * 0.6;
-        let top = reach * 1.3;
-        // Some rows saturate at their extremes, most do not.
-        let slack = 0.8 + 0.5 * random.unit();
-        let target = match spec.activation {
-            SpecActivation::Identity => 120.0 * share,
-            SpecActivation::Relu => 255.0 * share,
-            SpecActivation::Leaky(_) => 217.0 * share,
-            SpecActivation::HardGelu => 768.0,
-        };
-        layer.bias.push(bias.floor() as i32);
-        layer.scales.push(multiplier(spec, target * slack / top));
-    }
-}
-
-fn fit_output(spec: &Spec, layer: &mut Layer, sums: &[Vec<f64>], random: &mut Random) {
-    for (row, format) in spec.shape.outputs.iter().enumerate() {
-        let (low, high) = format.range();
-        let (middle, reach) = spread(sums, row);
-        let slack = 0.8 + 0.35 * random.unit();
-        let scale = multiplier(spec, f64::from(high - low) * slack / (2.0 * reach));
-        // There is no zero point here: the bias puts the middle of the sums on that of the format.
-        let centre = f64::from(high + low) / 2.0 / synthesizer::scale(scale);
-        layer.bias.push((centre - middle).floor() as i32);
-        layer.scales.push(scale);
-    }
-}
-
-/// A multiplier near a positive scale, of the kind that the spec asks for.
-fn multiplier(spec: &Spec, scale: f64) -> Multiplier {
-    // A finite positive normal: 52 bits of fraction below an implied one.
-    let bits = scale.to_bits();
-    let exponent = (bits >> 52) as i32 - 1023;
-    let (significand, width) = match spec.scale {
-        SpecScale::Arbitrary => ((bits & ((1 << 52) - 1)) | 1 << 52, 52),
-        SpecScale::PowerOfTwo => (1, 0),
-        // ⌊7/5 · 2^30⌋. Its lower half, 0x9999, is more than one half of 2^16.
-        SpecScale::BelowTies => (0x5999_9999, 30),
-    };
-    // Scales here lie between 2^−30 and 2^17, well within what a multiplier expresses.
-    Multiplier::nearest(significand, exponent - width).unwrap_or(Multiplier::power_of_two(0))
 }

@@ -1,12 +1,10 @@
-//! Spec: what a synthetic asset is to look like, and specs that cover every choice.
+//! Spec: what a synthetic asset is to look like.
 
-use super::random::Random;
+use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
-use ntmu_isa::rescale::Requantizer;
-use ntmu_isa::round::Rounding;
-use ntmu_isa::shape::{GridShape, OutputFormat, Shape};
+use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 
 /// The activation of a synthetic asset's hidden layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +17,10 @@ pub enum SpecActivation {
     Leaky(u8),
     /// Hard GELU.
     HardGelu,
+    /// Hard GELU of an argument limited to 3.
+    ClampedGelu,
+    /// A table; ReLU in fp16 layers, which have none.
+    Table,
 }
 
 /// The multipliers of a synthetic asset.
@@ -33,6 +35,24 @@ pub enum SpecScale {
     BelowTies,
 }
 
+/// The arithmetic of a layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpecKind {
+    /// Integers.
+    Integer {
+        /// Bits of a weight, 2..=8.
+        weight_bits: u8,
+        /// Bits of an output, 4..=16.
+        output_bits: u8,
+    },
+    /// fp16, into halves or into integers of these bits. Before an integer layer it gives integers
+    /// in any case, of eight bits if none are named.
+    Half {
+        /// Bits of an output, 4..=16.
+        quantize: Option<u8>,
+    },
+}
+
 /// What a synthetic asset is to look like.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Spec {
@@ -40,11 +60,12 @@ pub struct Spec {
     pub shape: Shape,
     /// Implementation-defined choices.
     pub profile: Profile,
-    /// Bits of a weight, 2..=8.
-    pub weight_bits: u8,
+    /// The arithmetic of the layers, one after the other and then from the first again.
+    pub kinds: Vec<SpecKind>,
     /// Widths of the hidden layers before the blocks.
     pub hidden: Vec<u16>,
-    /// Residual blocks of square layers, as wide as the last hidden layer; none without one.
+    /// Residual blocks of square layers, as wide as the last hidden layer; none without one. A skip
+    /// path between layers that cannot share one is left out.
     pub blocks: u8,
     /// Layers of a block, which its skip path spans, 1..=3.
     pub block_span: u8,
@@ -52,11 +73,14 @@ pub struct Spec {
     pub activation: SpecActivation,
     /// Of all rescalings.
     pub scale: SpecScale,
+    /// log2 of what the sums of fp16 layers and `Float16` channels reach, −12..=15.
+    pub reach: i8,
 }
 
 impl Spec {
     /// A small asset: `width` × `height`, whole chain, grids of 2 and 3 channels of 4 bits at 1/8,
-    /// one octave, two unorm8 channels, one hidden layer of 6 and one block, normative profile.
+    /// the corners of the first and the second interpolated, one octave, two unorm8 channels, one
+    /// hidden layer of 6 and one block of eight-bit integers, normative profile.
     #[must_use]
     pub fn small(width: u32, height: u32) -> Spec {
         Spec {
@@ -65,25 +89,70 @@ impl Spec {
                 height,
                 mip_count: Shape::max_mip_count(width, height),
                 octaves: 1,
+                wave: Wave::Triangle,
+                padding: 0,
+                input_bits: 8,
                 snap: CornerSnap::Cell,
                 address_mode: AddressMode::Wrap,
-                grids: [grid(2, 4, 3), grid(3, 4, 3)],
+                grids: [corners(2, 4, 3), interpolated(3, 4, 3)],
                 outputs: vec![OutputFormat::Unorm8; 2],
             },
             profile: Profile::NORMATIVE,
-            weight_bits: 8,
+            kinds: vec![SpecKind::Integer {
+                weight_bits: 8,
+                output_bits: 8,
+            }],
             hidden: vec![6],
             blocks: 1,
             block_span: 2,
             activation: SpecActivation::Relu,
             scale: SpecScale::Arbitrary,
+            reach: 0,
         }
+    }
+
+    /// The same with integer layers of these bits of weights and outputs.
+    #[must_use]
+    pub fn with_bits(self, weight_bits: u8, output_bits: u8) -> Spec {
+        let kind = SpecKind::Integer {
+            weight_bits,
+            output_bits,
+        };
+        Spec {
+            kinds: vec![kind],
+            ..self
+        }
+    }
+
+    /// The same with fp16 layers.
+    #[must_use]
+    pub fn with_halves(self) -> Spec {
+        Spec {
+            kinds: vec![SpecKind::Half { quantize: None }],
+            ..self
+        }
+    }
+
+    /// The arithmetic of a layer, from 0.
+    #[must_use]
+    pub fn kind(&self, layer: usize) -> SpecKind {
+        let default = SpecKind::Integer {
+            weight_bits: 8,
+            output_bits: 8,
+        };
+        self.kinds
+            .iter()
+            .cycle()
+            .nth(layer)
+            .copied()
+            .unwrap_or(default)
     }
 }
 
-/// A grid of `channels` latents of `bits` bits at 1/2^`scale_log2`; one bit if `bits` is no width.
+/// A grid of `channels` latents of `bits` bits at 1/2^`scale_log2`, of which the synthesizer gets the
+/// four corners; one bit if `bits` is no width.
 #[must_use]
-pub fn grid(channels: u16, bits: u8, scale_log2: u8) -> GridShape {
+pub fn corners(channels: u16, bits: u8, scale_log2: u8) -> GridShape {
     const ONE_BIT: LatentFormat = match LatentFormat::new(1) {
         Some(format) => format,
         None => panic!("a latent may have one bit"),
@@ -92,71 +161,15 @@ pub fn grid(channels: u16, bits: u8, scale_log2: u8) -> GridShape {
         channels,
         format: LatentFormat::new(bits).unwrap_or(ONE_BIT),
         scale_log2,
+        sampling: Sampling::Corners,
     }
 }
 
-/// Sizes at and around the edges that a grid of 1/8, 1/4 or 1/2 has, and some that are no power of
-/// two.
-const SIZES: [u32; 18] = [
-    1, 2, 3, 4, 5, 7, 8, 9, 12, 15, 16, 17, 24, 31, 33, 40, 64, 100,
-];
-
-/// A spec from a seed. Small enough to decode whole; over some hundred seeds every value of every
-/// enumeration, every width of a latent and weight, and every edge size occurs.
+/// As [`corners`], of which the synthesizer gets one interpolated latent a channel.
 #[must_use]
-pub fn arbitrary_spec(seed: u64) -> Spec {
-    let mut random = Random::new(seed);
-    let r = &mut random;
-    let (width, height) = (r.choose(&SIZES), r.choose(&SIZES));
-    let longest = i32::from(Shape::max_mip_count(width, height));
-    let mip_count = if r.within(0, 3) == 0 {
-        r.within(1, longest)
-    } else {
-        longest
-    };
-    let mut a_grid = |most: i32| {
-        let (channels, bits) = (r.within(1, most), r.within(1, 8));
-        grid(channels as u16, bits as u8, r.within(1, 3) as u8)
-    };
-    let grids = [a_grid(6), a_grid(8)];
-    let channels = r.within(1, 9);
-    let shape = Shape {
-        width,
-        height,
-        mip_count: mip_count as u8,
-        octaves: r.within(0, 3) as u8,
-        snap: r.choose(&CornerSnap::ALL),
-        address_mode: r.choose(&AddressMode::ALL),
-        grids,
-        outputs: (0..channels)
-            .map(|_| r.choose(&OutputFormat::ALL))
-            .collect(),
-    };
-    let profile = Profile {
-        input: r.choose(&Rounding::ALL),
-        leak: r.choose(&Rounding::ALL),
-        requantize: r.choose(&Requantizer::ALL),
-        skip: r.choose(&Requantizer::ALL),
-        output: r.choose(&Requantizer::ALL),
-    };
-    let layers = r.within(0, 3);
-    Spec {
-        shape,
-        profile,
-        weight_bits: r.within(2, 8) as u8,
-        hidden: (0..layers).map(|_| r.within(1, 17) as u16).collect(),
-        blocks: r.within(0, 3) as u8,
-        block_span: r.within(1, 3) as u8,
-        activation: match r.within(0, 3) {
-            0 => SpecActivation::Identity,
-            1 => SpecActivation::Relu,
-            2 => SpecActivation::Leaky(r.within(1, 7) as u8),
-            _ => SpecActivation::HardGelu,
-        },
-        scale: r.choose(&[
-            SpecScale::Arbitrary,
-            SpecScale::PowerOfTwo,
-            SpecScale::BelowTies,
-        ]),
+pub fn interpolated(channels: u16, bits: u8, scale_log2: u8) -> GridShape {
+    GridShape {
+        sampling: Sampling::Interpolated,
+        ..corners(channels, bits, scale_log2)
     }
 }

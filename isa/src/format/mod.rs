@@ -25,6 +25,7 @@
 
 mod bits;
 mod cursor;
+mod layers;
 mod sections;
 
 use crate::asset::{Asset, Parts};
@@ -34,7 +35,7 @@ use cursor::Cursor;
 /// The first eight bytes. As in PNG, they show a transfer that changed line ends or lost a bit.
 pub const MAGIC: [u8; 8] = [0x89, b'N', b'T', b'X', 0x0d, 0x0a, 0x1a, 0x0a];
 /// The major and minor version that this crate writes.
-pub const VERSION: (u16, u16) = (1, 0);
+pub const VERSION: (u16, u16) = (2, 0);
 
 const HEADER_BYTES: usize = 64;
 const ENTRY_BYTES: usize = 32;
@@ -49,7 +50,7 @@ impl Asset {
     pub fn to_bytes(&self) -> Vec<u8> {
         let bodies = [
             sections::write_shape(&self.shape),
-            sections::write_profile(&self.profile),
+            self.profile.to_bytes().to_vec(),
             bits::pack(
                 self.grids[0].iter().copied(),
                 self.shape.grids[0].format.bits(),
@@ -58,7 +59,7 @@ impl Asset {
                 self.grids[1].iter().copied(),
                 self.shape.grids[1].format.bits(),
             ),
-            sections::write_layers(self.weight_bits, &self.layers),
+            layers::write_layers(&self.layers),
             sections::write_metadata(&self.metadata),
         ];
         let mut offset = HEADER_BYTES + ENTRY_BYTES * KINDS.len();
@@ -108,12 +109,10 @@ impl Asset {
             bits::unpack(name, body, shape.grid_latents(index), format.bits())
         };
         let grids = [grid(0, grid0)?, grid(1, grid1)?];
-        let (weight_bits, layers) = sections::read_layers(weights)?;
         Asset::new(Parts {
             profile: sections::read_profile(profile)?,
             grids,
-            weight_bits,
-            layers,
+            layers: layers::read_layers(weights)?,
             metadata: sections::read_metadata(metadata)?,
             shape,
         })

@@ -1,18 +1,19 @@
-//! The bodies of the sections, each written and read side by side.
+//! The bodies of the sections, each written and read side by side; the layers have a file of their own.
 
-use super::bits;
 use super::cursor::Cursor;
-use crate::activation::Activation;
+use crate::accumulate::{Accumulator, Overflow};
 use crate::asset::{Encoding, Map, Metadata};
+use crate::embed::Wave;
 use crate::error::AssetError;
+use crate::filter::FilterRule;
+use crate::half::SumOrder;
 use crate::latent::LatentFormat;
-use crate::layer::{Layer, Skip};
 use crate::limits;
 use crate::position::{AddressMode, CornerSnap};
-use crate::profile::Profile;
-use crate::rescale::{Multiplier, Requantizer};
+use crate::profile::{PointSnap, Profile};
+use crate::rescale::Requantizer;
 use crate::round::Rounding;
-use crate::shape::{GridShape, OutputFormat, Shape};
+use crate::shape::{GridShape, OutputFormat, Sampling, Shape};
 
 /// The member of an enumeration with the next byte as its code.
 fn choice<T>(
@@ -25,7 +26,7 @@ fn choice<T>(
     from_code(code).ok_or_else(|| AssetError::field(field, code, format!("0..={}", count - 1)))
 }
 
-fn zeros(cursor: &mut Cursor<'_>, field: &str, count: usize) -> Result<(), AssetError> {
+pub(super) fn zeros(cursor: &mut Cursor<'_>, field: &str, count: usize) -> Result<(), AssetError> {
     match cursor.take(count)?.iter().find(|&&byte| byte != 0) {
         Some(byte) => Err(AssetError::field(field, byte, 0)),
         None => Ok(()),
@@ -33,19 +34,23 @@ fn zeros(cursor: &mut Cursor<'_>, field: &str, count: usize) -> Result<(), Asset
 }
 
 /// ```text
-/// u32 width, u32 height, u8 mips, u8 octaves, u8 snap, u8 address mode
-/// per grid: u16 channels, u8 bits, u8 log2 of the scale
+/// u32 width, u32 height, u8 mips, u8 octaves, u8 wave, u8 padding,
+/// u8 bits of an input, u8 snap, u8 address mode, u8 zero
+/// per grid: u16 channels, u8 bits, u8 log2 of the scale, u8 sampling, u8 zero
 /// u16 channels, per channel: u8 output format
 /// ```
 pub(super) fn write_shape(shape: &Shape) -> Vec<u8> {
     let mut out = Vec::new();
     out.extend(shape.width.to_le_bytes());
     out.extend(shape.height.to_le_bytes());
-    let (snap, mode) = (shape.snap.code(), shape.address_mode.code());
-    out.extend([shape.mip_count, shape.octaves, snap, mode]);
+    out.extend([shape.mip_count, shape.octaves]);
+    out.extend([shape.wave.code(), shape.padding]);
+    out.extend([shape.input_bits, shape.snap.code()]);
+    out.extend([shape.address_mode.code(), 0]);
     for grid in shape.grids {
         out.extend(grid.channels.to_le_bytes());
         out.extend([grid.format.bits(), grid.scale_log2]);
+        out.extend([grid.sampling.code(), 0]);
     }
     out.extend(shape.channel_count().to_le_bytes());
     out.extend(shape.outputs.iter().map(|o| o.code()));
@@ -56,28 +61,42 @@ pub(super) fn read_shape(body: &[u8]) -> Result<Shape, AssetError> {
     let mut cursor = Cursor::new("shape", body);
     let (width, height) = (cursor.u32()?, cursor.u32()?);
     let (mip_count, octaves) = (cursor.u8()?, cursor.u8()?);
-    let snap = choice(
-        &mut cursor,
-        "shape.snap",
-        CornerSnap::ALL.len(),
-        CornerSnap::from_code,
-    )?;
+    let waves = Wave::ALL.len();
+    let wave = choice(&mut cursor, "shape.wave", waves, Wave::from_code)?;
+    let (padding, input_bits) = (cursor.u8()?, cursor.u8()?);
+    let snaps = CornerSnap::ALL.len();
+    let snap = choice(&mut cursor, "shape.snap", snaps, CornerSnap::from_code)?;
     let address_mode = choice(
         &mut cursor,
         "shape.address_mode",
         AddressMode::ALL.len(),
         AddressMode::from_code,
     )?;
+    zeros(&mut cursor, "shape.reserved", 1)?;
     let mut grid = |index: usize| -> Result<GridShape, AssetError> {
+        let field = |name: &str| format!("shape.grid{index}.{name}");
         let channels = cursor.u16()?;
+        // Before anything is computed from it.
+        if channels > limits::MAX_GRID_CHANNELS {
+            let allowed = format!("1..={}", limits::MAX_GRID_CHANNELS);
+            return Err(AssetError::field(field("channels"), channels, allowed));
+        }
         let bits = cursor.u8()?;
-        let scale_log2 = cursor.u8()?;
         let format = LatentFormat::new(bits)
-            .ok_or_else(|| AssetError::field(format!("shape.grid{index}.bits"), bits, "1..=8"))?;
+            .ok_or_else(|| AssetError::field(field("bits"), bits, "1..=8"))?;
+        let scale_log2 = cursor.u8()?;
+        let sampling = choice(
+            &mut cursor,
+            &field("sampling"),
+            Sampling::ALL.len(),
+            Sampling::from_code,
+        )?;
+        zeros(&mut cursor, &field("reserved"), 1)?;
         Ok(GridShape {
             channels,
             format,
             scale_log2,
+            sampling,
         })
     };
     let grids = [grid(0)?, grid(1)?];
@@ -98,6 +117,9 @@ pub(super) fn read_shape(body: &[u8]) -> Result<Shape, AssetError> {
         height,
         mip_count,
         octaves,
+        wave,
+        padding,
+        input_bits,
         snap,
         address_mode,
         grids,
@@ -105,194 +127,52 @@ pub(super) fn read_shape(body: &[u8]) -> Result<Shape, AssetError> {
     })
 }
 
-/// `u8` each: input, leak, requantize, skip, output; three zeros.
-pub(super) fn write_profile(profile: &Profile) -> Vec<u8> {
-    let Profile {
-        input,
-        leak,
-        requantize,
-        skip,
-        output,
-    } = *profile;
-    let codes = [
-        input.code(),
-        leak.code(),
-        requantize.code(),
-        skip.code(),
-        output.code(),
-    ];
-    [codes.as_slice(), &[0; 3]].concat()
-}
-
+/// See [`Profile::to_bytes`]: one byte a choice, then zeros.
 pub(super) fn read_profile(body: &[u8]) -> Result<Profile, AssetError> {
     let mut cursor = Cursor::new("profile", body);
-    let mut rounding =
-        |field: &str| choice(&mut cursor, field, Rounding::ALL.len(), Rounding::from_code);
-    let (input, leak) = (rounding("profile.input")?, rounding("profile.leak")?);
-    let mut requantizer = |field: &str| {
-        choice(
-            &mut cursor,
-            field,
-            Requantizer::ALL.len(),
-            Requantizer::from_code,
-        )
-    };
+    let c = &mut cursor;
+    let (roundings, requantizers) = (Rounding::ALL.len(), Requantizer::ALL.len());
+    let rules = FilterRule::ALL.len();
+    let rounding = |c: &mut Cursor<'_>, field| choice(c, field, roundings, Rounding::from_code);
+    let requantizer =
+        |c: &mut Cursor<'_>, field| choice(c, field, requantizers, Requantizer::from_code);
+    let rule = |c: &mut Cursor<'_>, field| choice(c, field, rules, FilterRule::from_code);
     let profile = Profile {
-        input,
-        leak,
-        requantize: requantizer("profile.requantize")?,
-        skip: requantizer("profile.skip")?,
-        output: requantizer("profile.output")?,
+        subtexel_bits: c.u8()?,
+        lod_bits: c.u8()?,
+        coordinate: rounding(c, "profile.coordinate")?,
+        point_snap: choice(
+            c,
+            "profile.point_snap",
+            PointSnap::ALL.len(),
+            PointSnap::from_code,
+        )?,
+        filter: rule(c, "profile.filter")?,
+        filter_rounding: rounding(c, "profile.filter_rounding")?,
+        interpolate: rule(c, "profile.interpolate")?,
+        input: rounding(c, "profile.input")?,
+        accumulator: Accumulator {
+            bits: c.u8()?,
+            overflow: choice(
+                c,
+                "profile.accumulator.overflow",
+                Overflow::ALL.len(),
+                Overflow::from_code,
+            )?,
+        },
+        bias_bits: c.u8()?,
+        leak: rounding(c, "profile.leak")?,
+        requantize: requantizer(c, "profile.requantize")?,
+        skip: requantizer(c, "profile.skip")?,
+        residual_bits: c.u8()?,
+        output: requantizer(c, "profile.output")?,
+        sum: choice(c, "profile.sum", SumOrder::ALL.len(), SumOrder::from_code)?,
+        convert: rounding(c, "profile.convert")?,
     };
-    zeros(&mut cursor, "profile.reserved", 3)?;
+    // What is left is zeros: the choices take fewer bytes than the section has.
+    zeros(c, "profile.reserved", 6)?;
     cursor.finish()?;
     Ok(profile)
-}
-
-fn write_multiplier(out: &mut Vec<u8>, scale: Multiplier) {
-    out.extend(scale.mantissa().to_le_bytes());
-    out.push(scale.shift());
-}
-
-fn read_multiplier(cursor: &mut Cursor<'_>, field: &str) -> Result<Multiplier, AssetError> {
-    let (mantissa, shift) = (cursor.i32()?, cursor.u8()?);
-    Multiplier::new(mantissa, shift).map_err(|error| {
-        let allowed = "a mantissa in 2^30..2^31 and a shift in 2..=62";
-        AssetError::field(
-            field,
-            format!("{} / 2^{}", error.mantissa, error.shift),
-            allowed,
-        )
-    })
-}
-
-/// The multiplier that stands where there is none.
-const NO_MULTIPLIER: Multiplier = Multiplier::power_of_two(0);
-
-/// ```text
-/// u16 layers, u8 bits of a weight, u8 zero
-/// per layer: u16 inputs, u16 outputs, i16 zero point,
-///            u8 activation (0 identity, 1 relu, 2 leaky, 3 hard gelu), u8 leak shift,
-///            multiplier of the gate, u8 span of the skip path (0: none), multiplier of the skip
-///            per row: multiplier, i32 bias
-///            weights, two's complement, packed like latents, row by row
-/// multiplier: i32 mantissa, u8 shift
-/// ```
-pub(super) fn write_layers(weight_bits: u8, layers: &[Layer]) -> Vec<u8> {
-    let mut out = Vec::new();
-    out.extend((layers.len() as u16).to_le_bytes());
-    out.extend([weight_bits, 0]);
-    let mask = ((1_u16 << weight_bits) - 1) as u8;
-    for layer in layers {
-        out.extend(layer.inputs.to_le_bytes());
-        out.extend(layer.outputs.to_le_bytes());
-        out.extend(layer.zero_point.to_le_bytes());
-        let (kind, shift, gate) = match layer.activation {
-            Activation::Identity => (0, 0, NO_MULTIPLIER),
-            Activation::Relu => (1, 0, NO_MULTIPLIER),
-            Activation::Leaky { shift } => (2, shift, NO_MULTIPLIER),
-            Activation::HardGelu { scale } => (3, 0, scale),
-        };
-        out.extend([kind, shift]);
-        write_multiplier(&mut out, gate);
-        out.push(layer.skip.map_or(0, |skip| skip.span));
-        write_multiplier(
-            &mut out,
-            layer.skip.map_or(NO_MULTIPLIER, |skip| skip.scale),
-        );
-        for (&scale, &bias) in layer.scales.iter().zip(&layer.bias) {
-            write_multiplier(&mut out, scale);
-            out.extend(bias.to_le_bytes());
-        }
-        out.extend(bits::pack(
-            layer.weights.iter().map(|&w| w as u8 & mask),
-            weight_bits,
-        ));
-    }
-    out
-}
-
-pub(super) fn read_layers(body: &[u8]) -> Result<(u8, Vec<Layer>), AssetError> {
-    let mut cursor = Cursor::new("weights", body);
-    let layer_count = cursor.u16()?;
-    let weight_bits = cursor.u8()?;
-    zeros(&mut cursor, "weights.reserved", 1)?;
-    let (low, high) = limits::WEIGHT_BITS;
-    if weight_bits < low || weight_bits > high {
-        return Err(AssetError::field(
-            "weights.bits",
-            weight_bits,
-            format!("{low}..={high}"),
-        ));
-    }
-    if layer_count > limits::MAX_LAYERS {
-        let allowed = format!("1..={}", limits::MAX_LAYERS);
-        return Err(AssetError::field("weights.layers", layer_count, allowed));
-    }
-    let layers = (0..layer_count)
-        .map(|index| read_layer(&mut cursor, index, weight_bits))
-        .collect::<Result<_, _>>()?;
-    cursor.finish()?;
-    Ok((weight_bits, layers))
-}
-
-fn read_layer(cursor: &mut Cursor<'_>, index: u16, weight_bits: u8) -> Result<Layer, AssetError> {
-    let field = |name: &str| format!("weights.layer{index}.{name}");
-    let (inputs, outputs, zero_point) = (cursor.u16()?, cursor.u16()?, cursor.i16()?);
-    for (name, lanes) in [("inputs", inputs), ("outputs", outputs)] {
-        if lanes > limits::MAX_LANES {
-            let allowed = format!("1..={}", limits::MAX_LANES);
-            return Err(AssetError::field(field(name), lanes, allowed));
-        }
-    }
-    let (kind, shift) = (cursor.u8()?, cursor.u8()?);
-    let gate = read_multiplier(cursor, &field("gate"))?;
-    let activation = match kind {
-        0 => Activation::Identity,
-        1 => Activation::Relu,
-        2 => Activation::Leaky { shift },
-        3 => Activation::HardGelu { scale: gate },
-        _ => return Err(AssetError::field(field("activation"), kind, "0..=3")),
-    };
-    let span = cursor.u8()?;
-    let scale = read_multiplier(cursor, &field("skip"))?;
-    let skip = (span != 0).then_some(Skip { span, scale });
-    // What is not used must be what the writer puts there, so that reading loses nothing.
-    let unused = [
-        ("leak_shift", kind != 2 && shift != 0),
-        ("gate", kind != 3 && gate != NO_MULTIPLIER),
-        ("skip", span == 0 && scale != NO_MULTIPLIER),
-    ];
-    if let Some((name, _)) = unused.iter().find(|(_, is_set)| *is_set) {
-        return Err(AssetError::field(
-            field(name),
-            "a value that nothing uses",
-            "its default",
-        ));
-    }
-    let mut scales = Vec::new();
-    let mut bias = Vec::new();
-    for _ in 0..outputs {
-        scales.push(read_multiplier(cursor, &field("scale"))?);
-        bias.push(cursor.i32()?);
-    }
-    let count = u64::from(inputs) * u64::from(outputs);
-    let packed = cursor.take(bits::packed_bytes(count, weight_bits) as usize)?;
-    let sign = 8 - weight_bits;
-    let weights = bits::unpack("weights", packed, count, weight_bits)?
-        .into_iter()
-        .map(|code| ((code << sign) as i8) >> sign)
-        .collect();
-    Ok(Layer {
-        inputs,
-        outputs,
-        weights,
-        bias,
-        scales,
-        zero_point,
-        activation,
-        skip,
-    })
 }
 
 fn write_text(out: &mut Vec<u8>, text: &str) {

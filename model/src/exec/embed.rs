@@ -1,25 +1,42 @@
 //! Embed: corners, waves and level as inputs of the synthesizer.
 
-use crate::request::Request;
+use crate::place::Place;
 use ntmu_isa::Asset;
-use ntmu_isa::embed::{corner_input, level_input, wave_input};
+use ntmu_isa::embed::{Wave, corner_input, level_at, wave_at};
+use ntmu_isa::shape::Shape;
 
 /// Writes the four corners one after the other; gives the number of inputs.
 pub(super) fn concat(asset: &Asset, grid: usize, codes: &[u8], lanes: &mut [i16]) -> usize {
-    let format = asset.shape.grids[grid].format;
+    let (format, bits) = (asset.shape.grids[grid].format, asset.shape.input_bits);
     for (lane, &code) in lanes.iter_mut().zip(codes) {
-        *lane = corner_input(format.value(code), format, asset.profile.input) as i16;
+        *lane = corner_input(format.value(code), format, bits, asset.profile.input) as i16;
     }
     codes.len()
 }
 
 /// Writes the waves: octave by octave, x then y, phase 0 then a quarter; gives their number.
-pub(super) fn waves(request: Request, octaves: u16, lanes: &mut [i16]) -> usize {
+pub(super) fn waves(
+    wave: Wave,
+    shape: &Shape,
+    place: &Place,
+    octaves: u16,
+    lanes: &mut [i16],
+) -> usize {
+    let (bits, mip) = (place.bits(), place.mip());
     let mut written = 0;
     for octave in 0..octaves as u8 {
-        for texel in [request.x(), request.y()] {
+        for coordinate in [place.x(), place.y()] {
             for quarter in [false, true] {
-                lanes[written] = wave_input(texel, request.mip(), octave, quarter) as i16;
+                let input = wave_at(
+                    wave,
+                    coordinate,
+                    bits,
+                    mip,
+                    octave,
+                    quarter,
+                    shape.input_bits,
+                );
+                lanes[written] = input as i16;
                 written += 1;
             }
         }
@@ -27,6 +44,7 @@ pub(super) fn waves(request: Request, octaves: u16, lanes: &mut [i16]) -> usize 
     written
 }
 
-pub(super) fn level(request: Request, mip_count: u8) -> i16 {
-    level_input(request.mip(), mip_count) as i16
+pub(super) fn level(shape: &Shape, place: &Place) -> i16 {
+    let (lod, lod_bits) = (place.lod(), place.lod_bits());
+    level_at(lod, lod_bits, shape.mip_count, shape.input_bits) as i16
 }

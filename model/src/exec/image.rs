@@ -1,6 +1,7 @@
 //! Image: every texel of a texel block, or of a mip.
 
-use super::{Decoder, Machine};
+use super::Decoder;
+use super::machine::Machine;
 use crate::request::{BLOCK, Request, RequestError};
 use ndarray::parallel::prelude::*;
 use ndarray::{Array3, Axis};

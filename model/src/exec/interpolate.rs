@@ -1,5 +1,6 @@
-//! Interpolate: four corners become one latent vector, rounded once.
+//! Interpolate: four corners become one latent vector, rounded as the profile says.
 
+use super::position::Corners;
 use ntmu_isa::Asset;
 use ntmu_isa::embed::lerp_input;
 
@@ -8,18 +9,17 @@ pub(super) fn lerp(
     asset: &Asset,
     grid: usize,
     codes: &[u8],
-    weights: [i32; 4],
+    corners: &Corners,
     lanes: &mut [i16],
 ) -> usize {
     let shape = asset.shape.grids[grid];
     let channels = usize::from(shape.channels);
+    let fractions = corners.fractions(asset.profile.subtexel_bits);
     for (channel, lane) in lanes[..channels].iter_mut().enumerate() {
-        let sum = weights
-            .iter()
-            .enumerate()
-            .map(|(corner, weight)| weight * shape.format.value(codes[corner * channels + channel]))
-            .sum();
-        *lane = lerp_input(sum, shape.format, asset.profile.input) as i16;
+        let values = [0, 1, 2, 3]
+            .map(|corner: usize| shape.format.value(codes[corner * channels + channel]));
+        let (format, bits) = (shape.format, asset.shape.input_bits);
+        *lane = lerp_input(values, fractions, format, bits, &asset.profile) as i16;
     }
     channels
 }

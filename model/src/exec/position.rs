@@ -1,10 +1,11 @@
-//! Position: the request's corners in a grid.
+//! Position: a place's corners in a grid.
 
-use crate::request::Request;
-use ntmu_isa::position::{AxisPosition, corner_weights};
+use crate::place::Place;
+use ntmu_isa::filter::FilterRule;
+use ntmu_isa::position::{AxisPosition, PHASE_BITS};
 use ntmu_isa::shape::Shape;
 
-/// The square of corners around a texel centre, in one grid.
+/// The square of corners around a place, in one grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Corners {
     /// First corner, stride and phase along x.
@@ -24,6 +25,7 @@ impl Default for Corners {
             first: 0,
             stride: 1,
             phase: 0,
+            phase_bits: PHASE_BITS,
         };
         Corners {
             x: origin,
@@ -42,24 +44,36 @@ impl Corners {
         [(left, top), (right, top), (left, bottom), (right, bottom)]
     }
 
-    /// The four weights in 1/256, in the order of [`Corners::cells`].
+    /// The four weights by the normative rule, in the order of [`Corners::cells`]: products of the
+    /// axis weights in 1/2^(2·phase bits), 1/256 at texel centres.
     #[must_use]
     pub const fn weights(&self) -> [i32; 4] {
-        corner_weights(self.x, self.y)
+        let phases = [self.x.phase as u32, self.y.phase as u32];
+        let [w00, w10, w01, w11] = FilterRule::Exact.weights(phases, self.x.phase_bits as u32);
+        [w00 as i32, w10 as i32, w01 as i32, w11 as i32]
+    }
+
+    /// How far the place lies from the first corners, x then y, as fractions of a filter with `bits`
+    /// bits.
+    #[must_use]
+    pub const fn fractions(&self, bits: u8) -> [u32; 2] {
+        [self.x.fraction(bits), self.y.fraction(bits)]
     }
 }
 
-pub(super) fn corners(shape: &Shape, grid: usize, request: Request) -> Corners {
+/// The corners of a place in a grid, with phases of `phase_bits` bits.
+pub(super) fn corners(shape: &Shape, grid: usize, place: &Place, phase_bits: u8) -> Corners {
     let scale = shape.grids[grid].scale_log2;
+    let axis = |coordinate| {
+        let (bits, mip) = (place.bits(), place.mip());
+        AxisPosition::at(coordinate, bits, mip, scale, shape.snap, phase_bits)
+    };
+    let (x, y) = (axis(place.x()), axis(place.y()));
     let (width, height) = shape.grid_size(grid);
-    let x = AxisPosition::of(request.x(), request.mip(), scale, shape.snap);
-    let y = AxisPosition::of(request.y(), request.mip(), scale, shape.snap);
-    let columns = x.corners(width, shape.address_mode);
-    let rows = y.corners(height, shape.address_mode);
     Corners {
         x,
         y,
-        columns,
-        rows,
+        columns: x.corners(width, shape.address_mode),
+        rows: y.corners(height, shape.address_mode),
     }
 }

@@ -3,7 +3,7 @@
 use super::position::Corners;
 use crate::trace::Fetch;
 
-/// Sees the intermediate values of one texel, in the order in which they arise.
+/// Sees the intermediate values of one decode, in the order in which they arise.
 ///
 /// Every method does nothing unless it is overridden; `()` sees nothing and costs nothing. A probe
 /// cannot change a value.
@@ -14,13 +14,18 @@ pub trait Probe {
     fn fetch(&mut self, _fetch: &Fetch) {}
     /// The codes of a grid's four corners, one corner after the other.
     fn codes(&mut self, _grid: usize, _codes: &[u8]) {}
-    /// Inputs written by `stage` (`concat`, `lerp`, `wave`, `level`) from lane `lane` on.
+    /// Inputs written by `stage` (`concat`, `lerp`, `wave`, `saw`, `level`, `zero`) from lane `lane`
+    /// on.
     fn embedded(&mut self, _stage: &'static str, _lane: u16, _inputs: &[i16]) {}
-    /// A layer's accumulators: bias plus products.
+    /// An integer layer's accumulators: bias plus products.
     fn accumulators(&mut self, _layer: u16, _accumulators: &[i32]) {}
     /// The same accumulators after the activation, where there is one.
     fn activated(&mut self, _accumulators: &[i32]) {}
-    /// The values that a hidden layer writes to its register.
+    /// An fp16 layer's sums: bias plus products.
+    fn sums(&mut self, _layer: u16, _sums: &[f32]) {}
+    /// The same sums after the activation, where there is one, and before the skip path.
+    fn activated_sums(&mut self, _sums: &[f32]) {}
+    /// What a hidden layer writes to its register: integers, or the bits of halves.
     fn outputs(&mut self, _layer: u16, _values: &[i16]) {}
     /// The channel codes.
     fn emitted(&mut self, _codes: &[i32]) {}

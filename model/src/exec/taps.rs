@@ -21,11 +21,12 @@ pub struct GridTap {
 pub struct LayerTap {
     /// The layer.
     pub layer: u16,
-    /// Bias plus products.
+    /// Bias plus products: accumulators, or the bits of an fp16 layer's f32 sums.
     pub accumulators: Vec<i32>,
-    /// The accumulators after the activation; the same where the activation is the identity.
+    /// The same after the activation, before the skip path; equal where the activation is the
+    /// identity.
     pub activated: Vec<i32>,
-    /// The values written to the register; empty in the last layer.
+    /// What was written to the register, integers or the bits of halves; empty in the last layer.
     pub outputs: Vec<i16>,
 }
 
@@ -38,7 +39,7 @@ pub struct Taps {
     pub grids: [GridTap; 2],
     /// The inputs of the synthesizer, all lanes.
     pub inputs: Vec<i16>,
-    /// Per `dense` of the program, in its order.
+    /// Per `dense` and `dense.half` of the program, in its order.
     pub layers: Vec<LayerTap>,
     /// The channel codes.
     pub codes: Vec<i32>,
@@ -94,6 +95,14 @@ impl Probe for Taps {
         }
     }
 
+    fn sums(&mut self, layer: u16, sums: &[f32]) {
+        self.accumulators(layer, &bits(sums));
+    }
+
+    fn activated_sums(&mut self, sums: &[f32]) {
+        self.activated(&bits(sums));
+    }
+
     fn outputs(&mut self, _layer: u16, values: &[i16]) {
         if let Some(tap) = self.layers.last_mut() {
             tap.outputs = values.to_vec();
@@ -103,4 +112,8 @@ impl Probe for Taps {
     fn emitted(&mut self, codes: &[i32]) {
         self.codes = codes.to_vec();
     }
+}
+
+fn bits(sums: &[f32]) -> Vec<i32> {
+    sums.iter().map(|sum| sum.to_bits() as i32).collect()
 }

@@ -5,7 +5,7 @@
 //! The stepped model puts these costs one after the other; the closed form sums them.
 
 use super::unit::Unit;
-use super::work::Work;
+use super::work::{Operands, Work};
 
 /// The MAC array's cycles for one row of tiles and one batch, by what the array does in them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,6 +33,10 @@ pub(super) struct LayerCost {
     pub(super) column_tiles: u64,
     outputs: u64,
     rows: u64,
+    /// Passes of the array for a product.
+    passes: u64,
+    /// Cycles in which a tile of its weights comes to the shadow registers.
+    tile_load: u64,
     /// Requantiser slots of an output.
     slots: u64,
     /// Skip reads of an output.
@@ -63,6 +67,14 @@ impl LayerCost {
     /// Skip reads of so many outputs of one texel.
     pub(super) fn skips(&self, outputs: u64) -> u64 {
         outputs * self.skips
+    }
+}
+
+/// Bytes of a weight on its way to the array. Narrow ones take a byte each.
+const fn weight_bytes(operands: Operands) -> u64 {
+    match operands {
+        Operands::Bytes | Operands::Wide => 1,
+        Operands::Half => 2,
     }
 }
 
@@ -112,6 +124,12 @@ impl<'a> Cost<'a> {
                 column_tiles: u64::from(dense.inputs).div_ceil(u64::from(unit.mac_columns)),
                 outputs,
                 rows,
+                passes: u64::from(match dense.operands {
+                    Operands::Bytes => 1,
+                    Operands::Wide => unit.wide_passes,
+                    Operands::Half => unit.half_passes,
+                }),
+                tile_load: u64::from(unit.tile_load_cycles) * weight_bytes(dense.operands),
                 slots: u64::from(dense.requantizer_slots) / outputs,
                 skips: u64::from(dense.skip_reads) / outputs,
                 fill: if stays {
@@ -199,11 +217,12 @@ impl<'a> Cost<'a> {
     }
 
     /// The array's cycles for one row of tiles of a layer and a batch of so many texels: a pass for
-    /// each column of tiles, of as many cycles as an array has texels.
+    /// each column of tiles, of as many cycles as an array has texels, or a multiple where operands
+    /// are wider than bytes.
     pub(super) fn row(&self, layer: usize, row_tile: u64, texels: u64) -> RowCycles {
         let cost = &self.layers[layer];
-        let pass = texels.div_ceil(u64::from(self.unit.mac_arrays));
-        let loaded = pass.max(u64::from(self.unit.tile_load_cycles));
+        let pass = texels.div_ceil(u64::from(self.unit.mac_arrays)) * cost.passes;
+        let loaded = pass.max(cost.tile_load);
         let compute = cost.column_tiles * pass;
         let load = cost.column_tiles * (loaded - pass);
         let is_last = row_tile + 1 == cost.row_tiles;

@@ -3,16 +3,49 @@
 use super::Unit;
 use crate::request::Request;
 use crate::trace::{Fetch, Trace};
-use ntmu_isa::activation::Activation;
+use ntmu_isa::activation::{Activation, TABLE_ENTRIES};
 use ntmu_isa::asset::{Encoding, Map, Metadata, Parts};
+use ntmu_isa::embed::Wave;
+use ntmu_isa::half::Half;
 use ntmu_isa::latent::LatentFormat;
-use ntmu_isa::layer::{Layer, Skip};
+use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
 use ntmu_isa::layout::Layout;
 use ntmu_isa::position::{AddressMode, AxisPosition, CornerSnap};
 use ntmu_isa::profile::Profile;
 use ntmu_isa::rescale::Multiplier;
-use ntmu_isa::shape::{GridShape, OutputFormat, Shape};
+use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 use ntmu_isa::{Asset, Program};
+
+/// The arithmetic of a hidden layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Integers whose outputs have so many bits.
+    Integer(u8),
+    /// Halves.
+    Half,
+}
+
+/// A hidden layer.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hidden {
+    pub(super) kind: Kind,
+    pub(super) outputs: u16,
+    pub(super) activation: Activation,
+    /// Whether the layer before it is added. It has as many outputs, and a kind that allows it.
+    pub(super) adds: bool,
+}
+
+impl Hidden {
+    /// A layer of bytes.
+    pub(super) fn bytes(outputs: u16, activation: Activation, adds: bool) -> Hidden {
+        Hidden {
+            kind: Kind::Integer(8),
+            outputs,
+            activation,
+            adds,
+        }
+    }
+}
 
 /// What a test says about an asset; the rest follows.
 #[derive(Clone, Debug)]
@@ -21,43 +54,97 @@ pub(super) struct Sketch {
     pub(super) mip_count: u8,
     pub(super) grid_channels: [u16; 2],
     pub(super) octaves: u8,
-    /// Outputs and activation of each hidden layer, and whether the layer before it is added.
-    pub(super) hidden: Vec<(u16, Activation, bool)>,
+    pub(super) hidden: Vec<Hidden>,
+    /// The arithmetic of the last layer; an integer one has 8 bits.
+    pub(super) last: Kind,
     pub(super) channels: u16,
 }
 
+/// Numbers of a layer; `next` reads its output, `None` behind the last.
+fn parameters(
+    kind: Kind,
+    next: Option<Kind>,
+    inputs: u16,
+    outputs: u16,
+    table: bool,
+) -> Parameters {
+    let (macs, rows) = (
+        usize::from(inputs) * usize::from(outputs),
+        usize::from(outputs),
+    );
+    match kind {
+        Kind::Integer(output_bits) => Parameters::Integer(IntegerParameters {
+            weight_bits: 8,
+            weights: vec![1; macs],
+            bias: vec![0; rows],
+            scales: vec![Multiplier::power_of_two(8); rows],
+            output_bits,
+            zero_point: 0,
+            table: vec![0; if table { TABLE_ENTRIES } else { 0 }],
+        }),
+        Kind::Half => Parameters::Half(HalfParameters {
+            weights: vec![Half::ONE; macs],
+            bias: vec![Half::ZERO; rows],
+            quantize: match next {
+                Some(Kind::Integer(_)) => Some(Quantize {
+                    bits: 8,
+                    exponent: 4,
+                    zero_point: 0,
+                }),
+                Some(Kind::Half) | None => None,
+            },
+        }),
+    }
+}
+
 pub(super) fn asset(sketch: &Sketch) -> Asset {
-    let scale = Multiplier::power_of_two(8);
-    let grid = |channels| GridShape {
+    let grid = |channels, sampling| GridShape {
         channels,
         format: LatentFormat::new(4).unwrap(),
         scale_log2: 3,
+        sampling,
     };
+    let [first, second] = sketch.grid_channels;
     let shape = Shape {
         width: sketch.size,
         height: sketch.size,
         mip_count: sketch.mip_count,
         octaves: sketch.octaves,
+        wave: Wave::Triangle,
+        padding: 0,
+        input_bits: 8,
         snap: CornerSnap::Cell,
         address_mode: AddressMode::Wrap,
-        grids: sketch.grid_channels.map(grid),
+        grids: [
+            grid(first, Sampling::Corners),
+            grid(second, Sampling::Interpolated),
+        ],
         outputs: vec![OutputFormat::Unorm8; usize::from(sketch.channels)],
     };
+    let last = Hidden {
+        kind: sketch.last,
+        outputs: sketch.channels,
+        activation: Activation::Identity,
+        adds: false,
+    };
+    let hidden: Vec<Hidden> = sketch.hidden.iter().copied().chain([last]).collect();
     let mut inputs = shape.input_count() as u16;
-    let last = (sketch.channels, Activation::Identity, false);
     let mut layers = Vec::new();
-    for &(outputs, activation, adds) in sketch.hidden.iter().chain([&last]) {
+    for (index, layer) in hidden.iter().enumerate() {
+        let next = hidden.get(index + 1).map(|layer| layer.kind);
+        let has_table = layer.activation == Activation::Table;
+        let scale = match layer.kind {
+            Kind::Integer(_) => Multiplier::power_of_two(8),
+            Kind::Half => Multiplier::power_of_two(0),
+        };
         layers.push(Layer {
             inputs,
-            outputs,
-            weights: vec![1; usize::from(inputs) * usize::from(outputs)],
-            bias: vec![0; usize::from(outputs)],
-            scales: vec![scale; usize::from(outputs)],
-            zero_point: 0,
-            activation,
-            skip: adds.then_some(Skip { span: 1, scale }),
+            outputs: layer.outputs,
+            parameters: parameters(layer.kind, next, inputs, layer.outputs, has_table),
+            activation: layer.activation,
+            skip: layer.adds.then_some(Skip { span: 1, scale }),
         });
-        inputs = outputs;
+        inputs = layer.outputs;
     }
     let map = Map {
         name: "all".to_owned(),
@@ -75,7 +162,6 @@ pub(super) fn asset(sketch: &Sketch) -> Asset {
         shape,
         profile: Profile::NORMATIVE,
         grids,
-        weight_bits: 8,
         layers,
         metadata,
     })
@@ -134,6 +220,7 @@ pub(super) fn tiny() -> Sketch {
         grid_channels: [1, 1],
         octaves: 0,
         hidden: Vec::new(),
+        last: Kind::Integer(8),
         channels: 1,
     }
 }
@@ -148,14 +235,15 @@ pub(super) fn thin() -> Sketch {
 }
 
 pub(super) fn hardware_sized() -> Sketch {
-    let relu = (64, Activation::Relu, false);
-    let skip = (64, Activation::Leaky { shift: 3 }, true);
+    let relu = Hidden::bytes(64, Activation::Relu, false);
+    let skip = Hidden::bytes(64, Activation::Leaky { shift: 3 }, true);
     Sketch {
         size: 64,
         mip_count: 3,
         grid_channels: [8, 16],
         octaves: 3,
         hidden: vec![relu, relu, skip],
+        last: Kind::Integer(8),
         channels: 9,
     }
 }

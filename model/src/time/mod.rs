@@ -23,6 +23,8 @@
 //! - Corners are read when the texel's turn comes, without occupying the cache's data banks twice.
 //!   Conflicts are those of the tags.
 //! - A line that was replaced while it was under way, and is wanted again, joins the miss under way.
+//! - Integers of more than 8 bits and halves take whole passes of the array more. Numbers change
+//!   their kind where the array reads them, at no cost.
 //! - Accumulators hold a whole layer of every batch in flight, so the array never waits for a free
 //!   one within a layer. Activations are written as fast as they are requantised.
 //! - A job starts when its last texel is embedded and the job before it has left; its channels are

@@ -7,6 +7,7 @@
 //! - *ATTILA*: `bGPU.ini`: texture cache 16 KiB in 4 ways, access queue of 64.
 //! - *GPGPU-Sim*: texture cache `N:4:128:256` (128 KiB in lines of 128 bytes) for a QV100, and a
 //!   fragment FIFO of 512.
+//! - *NVIDIA A100*: int8 twice as fast as fp16, which is two passes for halves in every preset.
 //! - *Hakura and Gupta 1997*: working sets of at most 16 KiB.
 //!
 //! The rest is chosen, by one rule each, given beside the number: the arrays so that a 64-wide
@@ -66,6 +67,8 @@ const MOBILE: Configuration = Configuration {
     mac_rows: 16,
     mac_columns: 16,
     mac_arrays: 1,
+    wide_passes: 2,
+    half_passes: 2,
     // Multiplier, four levels of adders, accumulator.
     mac_depth_cycles: 6,
     // One row of tiles a cycle: keeps up with a layer of a single column of tiles.
@@ -121,6 +124,8 @@ const CONSOLE: Configuration = Configuration {
     mac_rows: 32,
     mac_columns: 32,
     mac_arrays: 1,
+    wide_passes: 2,
+    half_passes: 2,
     // One level of adders more than with 16 columns.
     mac_depth_cycles: 7,
     requantizer_lanes: 32,
@@ -170,6 +175,8 @@ const DESKTOP: Configuration = Configuration {
     mac_rows: 32,
     mac_columns: 32,
     mac_arrays: 4,
+    wide_passes: 2,
+    half_passes: 2,
     mac_depth_cycles: 7,
     // Four arrays of 32 rows.
     requantizer_lanes: 128,

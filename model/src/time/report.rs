@@ -41,7 +41,8 @@ pub struct Timing {
     pub hit_rate: f64,
     /// Multiplications.
     pub macs: u64,
-    /// Multiplications / (cycles × multiplications per cycle).
+    /// Multiplications / (cycles × multiplications of bytes per cycle): an array that always
+    /// multiplies halves in two passes has ½.
     pub mac_utilisation: f64,
     /// What limits the unit if nothing is waited for: the resource of the largest bound.
     pub bottleneck: Resource,

@@ -99,7 +99,7 @@ configuration! {
     unpack_lanes ["latents per cycle"] 1..=65_536,
     /// Latents interpolated in a cycle, four corners each.
     interpolator_lanes ["latents per cycle"] 1..=65_536,
-    /// Waves and levels computed in a cycle.
+    /// Waves, levels and zeros written in a cycle.
     embed_lanes ["inputs per cycle"] 1..=65_536,
     /// Texels of a batch: the array holds a tile of weights while they pass through it. 16 is a
     /// texel block.
@@ -108,11 +108,11 @@ configuration! {
     /// while another is requantised.
     batches_in_flight ["batches"] 1..=16,
     /// Bytes of parameters that stay in the unit. Layers that do not fit are streamed for each batch.
-    weight_sram_bytes ["bytes"] 0..=134_217_728,
+    weight_sram_bytes ["bytes"] 0..=268_435_456,
     /// Bytes of parameters that come from outside in a cycle, on a port of their own.
     weight_fill_bytes_per_cycle ["bytes per cycle"] 1..=1_048_576,
-    /// From weight SRAM to the array's shadow registers, for a tile; hidden behind the pass before
-    /// it as far as that is as long.
+    /// From weight SRAM to the array's shadow registers, for a tile of bytes, and twice as long for
+    /// one of halves; hidden behind the pass before it as far as that is as long.
     tile_load_cycles ["cycles"] 1..=4096,
     /// Outputs of a tile of weights.
     mac_rows ["rows"] 1..=1024,
@@ -120,13 +120,19 @@ configuration! {
     mac_columns ["columns"] 1..=1024,
     /// Copies of the array. They hold the same tile and share the texels of a batch.
     mac_arrays ["arrays"] 1..=64,
+    /// Passes of the array for integers of more than 8 bits times weights: 2 where a multiplier of
+    /// bytes takes such an integer in two halves (Bit Fusion, Sharma et al. 2018).
+    wide_passes ["passes"] 1..=64,
+    /// Passes of the array for halves: 2 is the published ratio of int8 to fp16 rates of GPU matrix
+    /// units (NVIDIA A100: 624 and 312 TOPS); 1 is an array built for fp16.
+    half_passes ["passes"] 1..=64,
     /// From the last input of a pass to its last accumulator.
     mac_depth_cycles ["cycles"] 0..=1000,
     /// Wide multiplications in a cycle, on accumulators.
     requantizer_lanes ["lanes"] 1..=65_536,
     /// From an accumulator to its activation.
     requantizer_depth_cycles ["cycles"] 0..=1000,
-    /// Activations read from the residual store, and rescaled, in a cycle.
+    /// Activations read from the residual store, and rescaled or added, in a cycle.
     skip_lanes ["activations per cycle"] 1..=65_536,
     /// Decoded texels that wait to leave the unit.
     output_queue_texels ["texels"] 1..=1_048_576,
@@ -372,7 +378,7 @@ impl Unit {
             memory_bytes_per_cycle: 1 << 20,
             lookups_per_bank: 1 << 12,
             mshrs: 1 << 12,
-            weight_sram_bytes: 1 << 27,
+            weight_sram_bytes: 1 << 28,
             weight_fill_bytes_per_cycle: 1 << 20,
             ..self.configuration
         };
@@ -396,7 +402,7 @@ impl Configuration {
         self.line_bytes as u64 * self.cache_sets as u64 * self.cache_ways as u64
     }
 
-    /// Multiplications that all arrays together do in a cycle.
+    /// Multiplications of bytes that all arrays together do in a cycle.
     #[must_use]
     pub const fn macs_per_cycle(&self) -> u64 {
         self.mac_rows as u64 * self.mac_columns as u64 * self.mac_arrays as u64
@@ -466,9 +472,14 @@ mod tests {
     }
 
     #[test]
-    fn ideal_memory_is_itself_a_unit() {
+    fn ideal_memory_is_itself_a_unit_and_holds_the_largest_program() {
+        use ntmu_isa::limits::{MAX_LANES, MAX_LAYERS};
+        let lanes = u64::from(MAX_LANES);
+        // Halves are the widest weights; a table and the wide rows of bytes are less.
+        let largest = u64::from(MAX_LAYERS) * (lanes * lanes + lanes) * 2;
         for name in super::super::presets::NAMES {
             let ideal = Unit::by_name(name).unwrap().with_ideal_memory();
+            assert!(u64::from(ideal.weight_sram_bytes) >= largest);
             assert_eq!(Unit::new(ideal.name(), *ideal.configuration()), Ok(ideal));
         }
     }

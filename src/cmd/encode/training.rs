@@ -10,7 +10,9 @@ use ntmu::isa::asset::Map;
 use ntmu::isa::shape::OutputFormat;
 use ntmu::quality::{self, Quality};
 use ntmu::texture_set::TextureSet;
-use ntmu::trainer::{self, EFFORTS, Preset, Progress, Source, TrainConfig, TrainError, Trained};
+use ntmu::trainer::{
+    self, EFFORTS, Precision, Preset, Progress, Source, TrainConfig, TrainError, Trained,
+};
 use ntmu::{beside, built_in};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -133,6 +135,17 @@ impl Encode {
         if let Some(bits) = self.latent_bits {
             config.grids[0].bits = bits;
             config.grids[1].bits = bits;
+        }
+        if let Some(name) = &self.precision {
+            let known = [Precision::Int8, Precision::Fp16];
+            let found = known.into_iter().find(|precision| precision.name() == name);
+            config.precision = found.with_context(|| {
+                let names = known.map(Precision::name).join(", ");
+                format!("precision: found {name:?}; allowed: {names}")
+            })?;
+        }
+        if let Some(bits) = self.activation_bits {
+            config.activation_bits = bits;
         }
         if let Some(bits) = self.weight_bits {
             config.weight_bits = bits;

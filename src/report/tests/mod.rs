@@ -5,8 +5,13 @@ mod parts;
 
 use super::MapPicture;
 use crate::quality::{Figures, MapQuality, Quality};
-use crate::study::{AssetStudy, Charge, OracleStudy, Study, SweepPoint, TimingRow, TwinStudy};
+use crate::study::{
+    AssetStudy, Charge, Findings, InBetween, OracleStudy, Study, SweepPoint, TimingRow, TwinStudy,
+    Variant, VariantOutcome,
+};
 use ndarray::Array3;
+use ntmu_conformance::claims::{Channel, Distance};
+use std::collections::BTreeMap;
 
 fn charge(cause: &str, cycles: u64) -> Charge {
     Charge {
@@ -51,7 +56,8 @@ fn study() -> Study {
             channels: 3,
             texels: 40,
             latent_bits: [3, 5],
-            weight_bits: 7,
+            precision: "w7a8".to_owned(),
+            profile: "nt-d3d11@0123456789abcdef".to_owned(),
             macs_per_texel: 5376,
             grid_bytes: 36_864,
             parameter_bytes: 5712,
@@ -69,6 +75,26 @@ fn study() -> Study {
             rms: 0.2961,
             typical: 0.2914,
             bound: 41.7,
+        },
+        claims: Findings {
+            profile: "nt-d3d11@0123456789abcdef".to_owned(),
+            texels: 512,
+            overflowing: 0,
+            not_naive: 0,
+            stages: BTreeMap::from([(
+                "inputs".to_owned(),
+                Distance {
+                    lane: 3,
+                    found: 0.49,
+                    bound: 0.5,
+                },
+            )]),
+            channels: vec![Channel {
+                observed_max: 1.83,
+                worst: 41.7,
+                observed_rms: 0.2961,
+                predicted_rms: 0.2914,
+            }],
         },
         twin: TwinStudy::Ran {
             adapter: "some adapter".to_owned(),
@@ -100,6 +126,30 @@ fn study() -> Study {
             bppc,
         })
         .to_vec(),
+        in_between: vec![InBetween {
+            lod: 0.5,
+            way: "two decodes",
+            psnr: 30.5,
+            decodes: 8.0,
+        }],
+        variants: vec![
+            Variant {
+                name: "<gemmlowp>".to_owned(),
+                outcome: VariantOutcome::Decoded {
+                    differing: 6021,
+                    codes: 786_429,
+                    largest: 3,
+                    psnr: Some(31.09),
+                    bppc: 0.577,
+                },
+            },
+            Variant {
+                name: "fp16 layers".to_owned(),
+                outcome: VariantOutcome::Impossible {
+                    reason: "layer 2: found a table".to_owned(),
+                },
+            },
+        ],
     }
 }
 

@@ -94,14 +94,14 @@ fn a_ledger_that_does_not_add_up_is_refused() {
 #[test]
 fn every_number_of_the_tables_is_in_the_page() {
     let page = html(&study(), &[]).unwrap();
-    let facts = "8 × 4|40 texels|3 / 5|>7<|5,376|41.6 KiB|42,576|36,864|5,712|0.577|31.11";
+    let facts = "8 × 4|40 texels|3 / 5|w7a8|nt-d3d11@0123456789abcdef|5,376|41.6 KiB|42,576|36,864|5,712|0.577|31.11";
     let quality = "34.57|0.9123|∞ (identical)|1.0000|35.11|0.9200|33.33|0.8765|32.22|0.8654|\
                    0.8543|8×4|4×2";
     let exactness = "786,429|777,017|4,210|5,202|0.5353 %|98.8032 %|0.6615 %|1.83|0.296|0.291|\
                      41.7|>−1<|>+1<";
     let cycles = "45.70|40.40|31.41|1.45 ×|1.29 ×|27.18|93.7 %|61.1 %|1,234.6|MAC array|40.00|\
                   5.70|0.30|40.10|87.5 %|12.5 %|99.3 %|0.7 %";
-    let precision = "34.25|33.50|29.75|0.561|0.455";
+    let precision = "34.25|33.50|29.75|0.561|0.455|6,021|31.09|layer 2: found a table|30.50|0.490";
     let numbers = [facts, quality, exactness, cycles, precision];
     for number in numbers.iter().flat_map(|section| section.split('|')) {
         assert!(page.contains(number), "{number}");

@@ -1,143 +1,66 @@
-//! The trainer's integers are isa's.
+//! The trainer's numbers are isa's.
 
+use super::by_isa::{decode, inputs};
 use super::{run, small, source};
 use crate::batch::all_texels;
 use crate::model::Ground;
-use crate::positions::Positions;
-use crate::sampler::{Embedding, Numbers, Texel, Window};
-use crate::{ActivationKind, Address, Snap, Steps, TrainConfig};
-use ntmu_isa::Asset;
-use ntmu_isa::activation::{Activation, gate, gate_argument, leak};
-use ntmu_isa::embed::{corner_input, lerp_input, level_input, wave_input};
-use ntmu_isa::position::{AxisPosition, corner_weights};
-use ntmu_isa::profile::Profile;
-use ntmu_isa::round::saturate;
+use crate::sampler::{Numbers, Texel, Window};
+use crate::{
+    ActivationKind, Address, GridSampling, Precision, Snap, Source, Steps, TrainConfig, Trained,
+    WaveForm,
+};
 
-/// The inputs of a texel by isa's formulas alone.
-fn inputs_by_isa(asset: &Asset, x: u32, y: u32, mip: u8) -> Vec<i32> {
-    let shape = &asset.shape;
-    let rounding = Profile::NORMATIVE.input;
-    let corners = |g: usize| {
-        let [px, py] =
-            [x, y].map(|t| AxisPosition::of(t, mip, shape.grids[g].scale_log2, shape.snap));
-        let (w, h) = shape.grid_size(g);
-        let (xs, ys) = (
-            px.corners(w, shape.address_mode),
-            py.corners(h, shape.address_mode),
-        );
-        let cells = [(0, 0), (1, 0), (0, 1), (1, 1)]
-            .map(|(i, j): (usize, usize)| asset.cell(g, xs[i], ys[j]));
-        (cells, corner_weights(px, py))
+/// Configurations that between them use every kind of input.
+fn embeddings() -> Vec<TrainConfig> {
+    use GridSampling::{Corners, Interpolated};
+    let of = |address, snap, sampling, wave, padding, input_bits| TrainConfig {
+        address,
+        snap,
+        sampling,
+        wave,
+        padding,
+        input_bits,
+        ..small()
     };
-    let mut out = Vec::new();
-    let format = shape.grids[0].format;
-    for cell in corners(0).0 {
-        out.extend(
-            cell.iter()
-                .map(|&c| corner_input(format.value(c), format, rounding)),
-        );
-    }
-    let format = shape.grids[1].format;
-    let (cells, weights) = corners(1);
-    for channel in 0..usize::from(shape.grids[1].channels) {
-        let products = weights.iter().zip(cells);
-        let sum = products
-            .map(|(w, cell)| w * format.value(cell[channel]))
-            .sum();
-        out.push(lerp_input(sum, format, rounding));
-    }
-    for octave in 0..shape.octaves {
-        for texel in [x, y] {
-            out.extend([false, true].map(|quarter| wave_input(texel, mip, octave, quarter)));
-        }
-    }
-    out.push(level_input(mip, shape.mip_count));
-    out
-}
-
-/// The codes of a texel by isa's formulas alone.
-fn decode_by_isa(asset: &Asset, x: u32, y: u32, mip: u8) -> Vec<i32> {
-    let profile = Profile::NORMATIVE;
-    let mut values = vec![inputs_by_isa(asset, x, y, mip)];
-    for (index, layer) in asset.layers.iter().enumerate() {
-        let input = &values[index];
-        let mut out = Vec::new();
-        for (row, &bias) in layer.bias.iter().enumerate() {
-            let mut accumulator = bias;
-            for (&w, &v) in layer.row(row).iter().zip(input) {
-                accumulator += i32::from(w) * v;
-            }
-            let scale = layer.scales[row];
-            let requantize = profile.requantize;
-            if index + 1 == asset.layers.len() {
-                let (low, high) = asset.shape.outputs[row].range();
-                out.push(saturate(
-                    profile.output.apply(accumulator, scale).into(),
-                    low,
-                    high,
-                ));
-                continue;
-            }
-            let mut value = match layer.activation {
-                Activation::Identity => requantize.apply(accumulator, scale),
-                Activation::Relu => requantize.apply(accumulator.max(0), scale),
-                Activation::Leaky { shift } => {
-                    requantize.apply(leak(accumulator, shift, profile.leak), scale)
-                }
-                Activation::HardGelu { scale: after } => {
-                    requantize.apply(gate(gate_argument(accumulator, scale, requantize)), after)
-                }
-            };
-            if let Some(skip) = layer.skip {
-                // values[i + 1] is the output of layer i.
-                let at = index - usize::from(skip.span);
-                let source = values[at + 1][row] - i32::from(asset.layers[at].zero_point);
-                value += profile.skip.apply(source, skip.scale);
-            }
-            out.push(saturate(
-                i64::from(value + i32::from(layer.zero_point)),
-                -128,
-                127,
-            ));
-        }
-        values.push(out);
-    }
-    values.pop().unwrap_or_default()
+    let (triangle, saw) = (WaveForm::Triangle, WaveForm::Saw);
+    vec![
+        of(
+            Address::Wrap,
+            Snap::Stride,
+            [Corners, Interpolated],
+            triangle,
+            0,
+            8,
+        ),
+        of(
+            Address::Mirror,
+            Snap::Cell,
+            [Interpolated, Corners],
+            saw,
+            3,
+            8,
+        ),
+        of(Address::Clamp, Snap::Stride, [Interpolated; 2], saw, 15, 4),
+        of(Address::Wrap, Snap::Cell, [Corners; 2], triangle, 1, 11),
+    ]
 }
 
 #[test]
 fn the_sampler_gives_isas_integers_at_every_texel() {
-    for (address, snap) in [
-        (Address::Wrap, Snap::Stride),
-        (Address::Mirror, Snap::Cell),
-        (Address::Clamp, Snap::Stride),
-    ] {
-        let config = TrainConfig {
-            address,
-            snap,
-            ..small()
-        };
+    let steps = Steps {
+        encoder: 0,
+        refine: 1,
+        integer: 1,
+    };
+    for config in embeddings() {
         let source = source(45, 70, 7);
-        let asset = run(
-            &source,
-            &TrainConfig {
-                steps: Some(Steps {
-                    encoder: 0,
-                    refine: 1,
-                    integer: 1,
-                }),
-                ..config.clone()
-            },
-        )
-        .unwrap()
-        .asset;
-        let positions = Positions::new(&asset.shape);
-        let embedding = Embedding {
-            numbers: Numbers::Integer,
-            channels: [3, 5],
-            bits: [4, 3],
-            inputs: config.input_count(),
+        let config = TrainConfig {
+            steps: Some(steps),
+            ..config
         };
+        let asset = run(&source, &config).unwrap().asset;
+        let ground = Ground::new(&config, &source).unwrap();
+        let embedding = ground.embedding(Numbers::Integer);
         let seen = [0, 1].map(|g: usize| -> Vec<f32> {
             let format = asset.shape.grids[g].format;
             asset.grids[g]
@@ -145,62 +68,149 @@ fn the_sampler_gives_isas_integers_at_every_texel() {
                 .map(|&c| format.value(c) as f32)
                 .collect()
         });
-        let windows = [Window::whole(&positions)];
-        let mut row = vec![0.0; config.input_count()];
+        let windows = [Window::whole(&ground.positions)];
+        let mut row = vec![9.0; config.input_count()];
         let sizes: Vec<_> = (0..7).map(|m| asset.shape.mip_size(m)).collect();
         for texel in all_texels(&sizes) {
-            embedding.gather(&positions, &windows, texel, [&seen[0], &seen[1]], &mut row);
-            let expected = inputs_by_isa(&asset, texel.x, texel.y, texel.mip);
-            let found: Vec<i32> = row.iter().map(|&v| v as i32).collect();
-            assert_eq!(found, expected, "{texel:?} {address:?} {snap:?}");
+            let seen = [seen[0].as_slice(), &seen[1]];
+            embedding.gather(&ground.positions, &windows, texel, seen, &mut row);
+            let expected = inputs(&asset, texel.x, texel.y, texel.mip);
+            let found: Vec<i16> = row.iter().map(|&v| v as i16).collect();
+            assert_eq!(found, expected, "{texel:?} {config:?}");
         }
     }
 }
 
+/// The decibels of the codes that isa's functions decode from an asset.
+fn decibels_by_isa(source: &Source, trained: &Trained) -> f64 {
+    let asset = &trained.asset;
+    let (mut sum, mut count) = (0.0, 0_u32);
+    for (mip, reals) in source.mips.iter().enumerate() {
+        let (channels, height, width) = reals.dim();
+        for y in 0..height {
+            for x in 0..width {
+                let codes = decode(asset, x as u32, y as u32, mip as u8);
+                for c in 0..channels {
+                    let high = asset.shape.outputs[c].range().1 as f32;
+                    let real = codes[c] as f32 / high;
+                    sum += f64::from(real - reals[[c, y, x]]).powi(2);
+                    count += 1;
+                }
+            }
+        }
+    }
+    -10.0 * (sum / f64::from(count)).log10()
+}
+
 /// The error that the report states is that of the codes that isa's functions decode from the
-/// exported integers: the network that was trained is the network that was exported.
+/// exported numbers: the network that was trained is the network that was exported.
+fn assert_the_export_is_what_was_trained(config: &TrainConfig) {
+    let source = source(40, 24, 5);
+    let trained = run(&source, config).unwrap();
+    let difference = (decibels_by_isa(&source, &trained) - trained.report.psnr_quantised).abs();
+    // The same terms in another order of summation in doubles, and one f32 division that may
+    // differ in its last place: one 8-bit code that differs would show at about 1e-5, one 16-bit
+    // code at about 2e-7.
+    assert!(difference < 1e-7, "{config:?}: {difference:e}");
+}
+
+const ACTIVATIONS: [ActivationKind; 4] = [
+    ActivationKind::Relu,
+    ActivationKind::Leaky { shift: 3 },
+    ActivationKind::HardGelu,
+    ActivationKind::ClampedHardGelu,
+];
+
 #[test]
 fn the_trained_integers_are_those_of_the_asset() {
-    for activation in [
-        ActivationKind::Relu,
-        ActivationKind::Leaky { shift: 3 },
-        ActivationKind::HardGelu,
-    ] {
-        for (weight_bits, layers_per_block) in [(8, 2), (4, 1), (2, 3)] {
-            let config = TrainConfig {
+    for activation in ACTIVATIONS {
+        for (weight_bits, layers_per_block, activation_bits) in [(8, 2, 8), (4, 1, 4), (2, 3, 12)] {
+            assert_the_export_is_what_was_trained(&TrainConfig {
                 activation,
                 weight_bits,
                 layers_per_block,
+                activation_bits,
+                ..small()
+            });
+        }
+    }
+}
+
+#[test]
+fn every_kind_of_input_is_trained_as_it_is_decoded() {
+    for config in embeddings() {
+        for precision in [Precision::Int8, Precision::Fp16] {
+            assert_the_export_is_what_was_trained(&TrainConfig {
+                precision,
+                ..config.clone()
+            });
+        }
+    }
+}
+
+#[test]
+fn the_trained_halves_are_those_of_the_asset() {
+    for activation in ACTIVATIONS {
+        for layers_per_block in [1, 2] {
+            assert_the_export_is_what_was_trained(&TrainConfig {
+                activation,
+                layers_per_block,
+                precision: Precision::Fp16,
+                ..small()
+            });
+        }
+    }
+}
+
+#[test]
+fn layers_of_both_precisions_are_trained_as_they_are_decoded() {
+    let (i, h) = (Precision::Int8, Precision::Fp16);
+    // Layers 1 to 4 are two residual blocks of two; the skip paths start at layers 0, 2.. and each
+    // keeps to one kind of register: that of the layer after its start.
+    let lists: [&[Precision]; 5] = [
+        &[h, i, i, i, i, h],
+        &[i, h, h, h, h, i],
+        &[h, h, h, h, h, i],
+        &[i, i, i, i, i, h],
+        &[h, i, i, i, i, i],
+    ];
+    for activation in ACTIVATIONS {
+        for (list, activation_bits) in lists.into_iter().zip([8, 6, 8, 4, 11]) {
+            let config = TrainConfig {
+                activation,
+                activation_bits,
+                hidden: vec![20],
+                precision_per_layer: Some(list.to_vec()),
                 ..small()
             };
-            let source = source(40, 24, 5);
-            let trained = run(&source, &config).unwrap();
-            let asset = &trained.asset;
-            let (mut sum, mut count) = (0.0, 0_u32);
-            for (mip, reals) in source.mips.iter().enumerate() {
-                let (channels, height, width) = reals.dim();
-                for y in 0..height {
-                    for x in 0..width {
-                        let codes = decode_by_isa(asset, x as u32, y as u32, mip as u8);
-                        for c in 0..channels {
-                            let high = asset.shape.outputs[c].range().1 as f32;
-                            let real = codes[c] as f32 / high;
-                            sum += f64::from(real - reals[[c, y, x]]).powi(2);
-                            count += 1;
-                        }
-                    }
-                }
+            if list == lists[1] {
+                // The first path starts in an integer register that a half layer reads.
+                let error = config.validate().unwrap_err().to_string();
+                assert!(error.contains("precision_per_layer"), "{error}");
+            } else {
+                assert_the_export_is_what_was_trained(&config);
             }
-            let psnr = -10.0 * (sum / f64::from(count)).log10();
-            // The same terms in another order of summation in doubles, and one f32 division that
-            // may differ in its last place: one 8-bit code that
-            // differs would show at about 1e-5, one 16-bit code at about 2e-7.
-            let difference = (psnr - trained.report.psnr_quantised).abs();
-            assert!(
-                difference < 1e-7,
-                "{activation:?} {weight_bits}: {difference:e}"
-            );
         }
+    }
+}
+
+#[test]
+fn halves_exported_from_reals_keep_the_quality() {
+    for activation in ACTIVATIONS {
+        let source = source(64, 64, 5);
+        let config = TrainConfig {
+            activation,
+            precision: Precision::Fp16,
+            steps: Some(Steps {
+                encoder: 0,
+                refine: 400,
+                integer: 0,
+            }),
+            ..small()
+        };
+        let trained = run(&source, &config).unwrap();
+        let difference = decibels_by_isa(&source, &trained) - trained.report.psnr_float;
+        assert!(difference.abs() < 0.05, "{activation:?}: {difference}");
     }
 }
 
@@ -212,22 +222,25 @@ fn constant_channels_are_reproduced_exactly_beside_others() {
         mip.index_axis_mut(ndarray::Axis(0), 3).fill(1.0);
         mip.index_axis_mut(ndarray::Axis(0), 4).fill(-1.0);
     }
-    let config = TrainConfig {
-        steps: Some(Steps {
-            encoder: 0,
-            refine: 20,
-            integer: 20,
-        }),
-        ..small()
-    };
-    let asset = run(&source, &config).unwrap().asset;
-    for texel in all_texels(&[(16, 16), (8, 8), (4, 4)]) {
-        let codes = decode_by_isa(&asset, texel.x, texel.y, texel.mip);
-        // 0.25 of 255 is 63.75: the nearest code is 64.
-        assert_eq!(
-            [codes[0], codes[2], codes[3], codes[4]],
-            [51, 64, 65_535, -127]
-        );
+    for precision in [Precision::Int8, Precision::Fp16] {
+        let config = TrainConfig {
+            precision,
+            steps: Some(Steps {
+                encoder: 0,
+                refine: 20,
+                integer: 20,
+            }),
+            ..small()
+        };
+        let asset = run(&source, &config).unwrap().asset;
+        for texel in all_texels(&[(16, 16), (8, 8), (4, 4)]) {
+            let codes = decode(&asset, texel.x, texel.y, texel.mip);
+            // 0.25 of 255 is 63.75: the nearest code is 64.
+            assert_eq!(
+                [codes[0], codes[2], codes[3], codes[4]],
+                [51, 64, 65_535, -127]
+            );
+        }
     }
 }
 

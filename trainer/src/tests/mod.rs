@@ -1,5 +1,6 @@
 //! Claims about whole runs, and what they share.
 
+mod by_isa;
 mod integers;
 mod runs;
 

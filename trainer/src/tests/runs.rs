@@ -5,44 +5,55 @@ use crate::checkpoint;
 use crate::model::{Ground, Model};
 use crate::refine::Rates;
 use crate::schedule::Stage;
-use crate::{ActivationKind, Preset, Source, Steps, TrainConfig, TrainError, train};
+use crate::{
+    ActivationKind, GridSampling, Precision, Preset, Source, Steps, TrainConfig, TrainError,
+    WaveForm, train,
+};
 use ntmu_isa::shape::Shape;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 #[test]
-fn training_improves_and_the_integers_keep_the_quality() {
+fn training_improves_and_the_numbers_of_the_decode_keep_the_quality() {
     let source = source(64, 64, 5);
-    let steps = |n| {
-        Some(Steps {
+    let quality = |n: u64, config: &TrainConfig| {
+        let steps = Steps {
             encoder: 0,
             refine: n,
             integer: n / 2,
-        })
+        };
+        let config = TrainConfig {
+            steps: Some(steps),
+            ..config.clone()
+        };
+        run(&source, &config).unwrap().report
     };
-    let short = run(
-        &source,
-        &TrainConfig {
-            steps: steps(10),
+    let (int8, fp16) = (Precision::Int8, Precision::Fp16);
+    for config in [
+        small(),
+        TrainConfig {
+            precision: fp16,
             ..small()
         },
-    )
-    .unwrap()
-    .report;
-    let long = run(
-        &source,
-        &TrainConfig {
-            steps: steps(600),
+        TrainConfig {
+            precision_per_layer: Some(vec![fp16, fp16, int8, int8, int8, int8, fp16]),
             ..small()
         },
-    )
-    .unwrap()
-    .report;
-    assert!(
-        long.psnr_quantised > short.psnr_quantised + 6.0,
-        "{short:?} {long:?}"
-    );
-    assert!(long.psnr_quantised > long.psnr_float - 0.3, "{long:?}");
+        TrainConfig {
+            activation: ActivationKind::ClampedHardGelu,
+            sampling: [GridSampling::Interpolated; 2],
+            wave: WaveForm::Saw,
+            padding: 3,
+            ..small()
+        },
+    ] {
+        let (short, long) = (quality(10, &config), quality(600, &config));
+        assert!(
+            long.psnr_quantised > short.psnr_quantised + 6.0,
+            "{short:?} {long:?}"
+        );
+        assert!(long.psnr_quantised > long.psnr_float - 0.3, "{long:?}");
+    }
 }
 
 #[test]
@@ -239,7 +250,7 @@ fn every_preset_is_valid_and_makes_an_asset() {
 #[test]
 fn configurations_out_of_range_are_refused_by_field() {
     type Change = fn(&mut TrainConfig);
-    let cases: [(&str, Change); 7] = [
+    let cases: [(&str, Change); 13] = [
         ("grids[1].bits", |c| c.grids[1].bits = 9),
         ("hidden", |c| c.hidden.clear()),
         ("layers_per_block", |c| c.layers_per_block = 4),
@@ -249,6 +260,21 @@ fn configurations_out_of_range_are_refused_by_field() {
         ("batch", |c| c.batch = 1000),
         ("crop", |c| c.crop = 100),
         ("uniform_mips", |c| c.uniform_mips = f64::NAN),
+        ("padding", |c| c.padding = 16),
+        ("input_bits: found 3; allowed: 4..=16", |c| c.input_bits = 3),
+        ("input_bits: found 13; allowed: 4..=12", |c| {
+            c.input_bits = 13;
+            c.precision = Precision::Fp16;
+        }),
+        ("input_bits: found 14; allowed: 4..=12", |c| {
+            c.input_bits = 14
+        }),
+        ("activation_bits: found 13; allowed: 4..=12", |c| {
+            c.activation_bits = 13
+        }),
+        ("precision_per_layer: found 2 layers; allowed: 7", |c| {
+            c.precision_per_layer = Some(vec![Precision::Int8; 2]);
+        }),
     ];
     for (field, change) in cases {
         let mut config = small();

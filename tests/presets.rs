@@ -1,0 +1,82 @@
+//! Every preset is a network that the unit runs: trained a little, compiled, decoded, and held to the
+//! claims against the naive evaluation and the oracle.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![cfg(feature = "train")]
+
+mod support;
+
+use ntmu::conformance::claims::findings;
+use ntmu::isa::Asset;
+use ntmu::isa::layer::Layer;
+use ntmu::model::Request;
+use ntmu::trainer::{self, Precision, Preset, Steps, TrainConfig};
+use std::sync::atomic::AtomicBool;
+
+fn trained(preset: &Preset, precision: Precision) -> Asset {
+    let config = TrainConfig {
+        steps: Some(Steps {
+            encoder: 0,
+            refine: 4,
+            integer: 2,
+        }),
+        batch: 256,
+        precision,
+        ..preset.config()
+    };
+    let stop = AtomicBool::new(false);
+    let source = support::source::brick_wall(32);
+    let trained = trainer::train(&source, &config, None, false, &stop, &mut |_| ());
+    trained.unwrap().asset
+}
+
+fn some_texels(asset: &Asset) -> Vec<Request> {
+    let mips = 0..asset.shape.mip_count;
+    mips.flat_map(|mip| {
+        let (width, height) = asset.shape.mip_size(mip);
+        [(0, 0), (width / 2, height / 3), (width - 1, height - 1)]
+            .map(|(x, y)| Request::new(&asset.shape, x, y, mip).unwrap())
+    })
+    .collect()
+}
+
+#[test]
+fn every_preset_keeps_the_claims_in_bytes_and_in_halves() {
+    for preset in Preset::ALL {
+        for precision in [Precision::Int8, Precision::Fp16] {
+            let asset = trained(&preset, precision);
+            let found = findings(&asset, &some_texels(&asset));
+            assert!(found.hold(), "{} {precision:?}: {found:#?}", preset.name);
+            assert_eq!(found.overflowing, 0, "{} {precision:?}", preset.name);
+        }
+    }
+}
+
+#[test]
+fn the_peers_networks_have_the_widths_that_they_are_known_for() {
+    let widths = |name: &str| {
+        let asset = trained(&Preset::by_name(name).unwrap(), Precision::Int8);
+        let mut widths = vec![asset.shape.input_count() as u16];
+        widths.extend(asset.layers.iter().map(|layer| layer.outputs));
+        // The last is the set's channels.
+        widths.pop();
+        widths
+    };
+    assert_eq!(widths("rtxntc"), [48, 64, 48, 32]);
+    assert_eq!(widths("tsnc"), [16, 64, 64]);
+    for (name, inputs) in [
+        ("ntc-0.2", 57),
+        ("ntc-0.5", 81),
+        ("ntc-1.0", 71),
+        ("ntc-2.25", 89),
+    ] {
+        assert_eq!(widths(name), [inputs, 64, 64, 64], "{name}");
+    }
+    let macs = |name: &str| -> u32 {
+        let asset = trained(&Preset::by_name(name).unwrap(), Precision::Int8);
+        let hidden = &asset.layers[..asset.layers.len() - 1];
+        hidden.iter().map(Layer::macs).sum()
+    };
+    // With the sixteen channels that both give, 8,192 and 6,144 in all.
+    assert_eq!(macs("rtxntc") + 32 * 16, 8192);
+    assert_eq!(macs("tsnc") + 64 * 16, 6144);
+}

@@ -1,0 +1,163 @@
+//! Quantise: the network that the unit computes, from real parameters.
+//!
+//! Training computes with the very numbers that the export writes down, and passes gradients
+//! straight through every rounding.
+
+use crate::choices::Precision;
+use crate::config::TrainConfig;
+use crate::half::half_layer;
+use crate::integer::integer_layer;
+use crate::network::Network;
+use crate::topology::{LayerShape, Topology};
+use ntmu_isa::accumulate::signed_range;
+use ntmu_isa::shape::OutputFormat;
+
+/// What a unit of a hidden layer's register means: real = scale · (value − zero_point).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Range {
+    pub(crate) scale: f32,
+    pub(crate) zero_point: i16,
+}
+
+impl Range {
+    /// That of a register of halves.
+    pub(crate) const HALVES: Range = Range {
+        scale: 1.0,
+        zero_point: 0,
+    };
+}
+
+/// Bits of the integers of a decode.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Widths {
+    pub(crate) input: u8,
+    pub(crate) weight: u8,
+    pub(crate) activation: u8,
+}
+
+impl Widths {
+    pub(crate) fn of(config: &TrainConfig) -> Widths {
+        Widths {
+            input: config.input_bits,
+            weight: config.weight_bits,
+            activation: config.activation_bits,
+        }
+    }
+
+    /// The smallest and the largest activation.
+    pub(crate) fn lanes(self) -> (f64, f64) {
+        let (low, high) = signed_range(self.activation);
+        (f64::from(low), f64::from(high))
+    }
+}
+
+/// A network in the numbers of the decode, and what its gradients need to become gradients of real
+/// parameters.
+#[derive(Clone, Debug)]
+pub(crate) struct Quantised {
+    pub(crate) network: Network,
+    /// For each layer, the derivative of each row's weights by the real ones (0 in the padding).
+    inverse: Vec<Vec<f32>>,
+    /// For each layer, the scale of its input.
+    input_scale: Vec<f32>,
+}
+
+/// What is known about a layer when it is quantised.
+pub(crate) struct Context<'a> {
+    pub(crate) topology: &'a Topology,
+    pub(crate) ranges: &'a [Range],
+    pub(crate) widths: Widths,
+    pub(crate) outputs: &'a [OutputFormat],
+    pub(crate) index: usize,
+    pub(crate) shape: LayerShape,
+    /// The real weights and biases, padded.
+    pub(crate) weights: &'a [f32],
+    pub(crate) bias: &'a [f32],
+    /// What a unit of its input means.
+    pub(crate) input_scale: f32,
+}
+
+impl Context<'_> {
+    /// What a unit of its output means; none in the last layer.
+    pub(crate) fn range(&self) -> Option<&Range> {
+        self.ranges.get(self.index)
+    }
+
+    /// In the last layer, the smallest and the largest code of each channel (0 in the padding).
+    pub(crate) fn codes(&self) -> Vec<(f64, f64)> {
+        if self.index + 1 < self.topology.layers.len() {
+            return Vec::new();
+        }
+        let ranges = self.outputs.iter().map(|o| o.range());
+        let mut codes: Vec<_> = ranges.map(|(l, h)| (f64::from(l), f64::from(h))).collect();
+        codes.resize(self.shape.columns(), (0.0, 0.0));
+        codes
+    }
+}
+
+/// The network of `parameters` in the numbers of the decode.
+pub(crate) fn quantise(
+    topology: &Topology,
+    parameters: &[f32],
+    ranges: &[Range],
+    widths: Widths,
+    outputs: &[OutputFormat],
+) -> Quantised {
+    let mut input_scale = vec![1.0 / (1_u32 << (widths.input - 1)) as f32];
+    input_scale.extend(ranges.iter().map(|r| r.scale));
+    let mut inverse = Vec::new();
+    let mut layers = Vec::new();
+    for (index, shape) in topology.layers.iter().enumerate() {
+        let context = Context {
+            topology,
+            ranges,
+            widths,
+            outputs,
+            index,
+            shape: *shape,
+            weights: shape.weights(parameters),
+            bias: shape.bias(parameters),
+            input_scale: input_scale[index],
+        };
+        let (layer, derivative) = match shape.precision {
+            Precision::Int8 => integer_layer(&context),
+            Precision::Fp16 => half_layer(&context),
+        };
+        layers.push(layer);
+        inverse.push(derivative);
+    }
+    let low = outputs
+        .iter()
+        .map(|&o| crate::source::real_range(o).0)
+        .collect();
+    let network = Network {
+        layers,
+        activation: topology.activation,
+        low,
+    };
+    Quantised {
+        network,
+        inverse,
+        input_scale,
+    }
+}
+
+impl Quantised {
+    /// Turns the gradient of the decode's numbers into that of the real parameters, straight
+    /// through the roundings.
+    pub(crate) fn to_real_gradient(&self, topology: &Topology, gradient: &mut [f32]) {
+        for (index, shape) in topology.layers.iter().enumerate() {
+            let inverse = &self.inverse[index];
+            let weights = &mut gradient[shape.weights_at..shape.bias_at];
+            for row in weights.chunks_exact_mut(shape.columns()) {
+                for (g, r) in row.iter_mut().zip(inverse) {
+                    *g *= r;
+                }
+            }
+            let bias = &mut gradient[shape.bias_at..shape.bias_at + shape.columns()];
+            for (g, r) in bias.iter_mut().zip(inverse) {
+                *g *= r / self.input_scale[index];
+            }
+        }
+    }
+}
