@@ -1,11 +1,10 @@
-//! Decoded: every texel of every mip of an asset, from the model.
+//! Decoded: every texel of every mip of an asset.
 
-use ndarray::Array3;
+use ndarray::{Array3, ArrayView3};
+use ntmu_isa::Asset;
 use ntmu_isa::half::Half;
-use ntmu_isa::layout::Layout;
 use ntmu_isa::shape::{OutputFormat, Shape};
-use ntmu_isa::{Asset, Program};
-use ntmu_model::exec::Decoder;
+use ntmu_model::engine::Engine;
 
 /// The channel codes of an asset's chain.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,16 +14,15 @@ pub struct Decoded {
 }
 
 impl Decoded {
-    /// Runs the model on every texel of every mip. `after_mip` is called with the texels done.
+    /// Decodes every texel of every mip, with the engine. `after_mip` is called with the texels
+    /// done.
     #[must_use]
     pub fn of(asset: &Asset, mut after_mip: impl FnMut(u64)) -> Decoded {
-        // Values do not depend on where memory keeps the grids.
-        let program = Program::compile(asset, Layout::Linear);
-        let decoder = Decoder::new(asset, &program);
+        let engine = Engine::new(asset);
         let mut done = 0;
         let mips = (0..asset.shape.mip_count)
             .map(|mip| {
-                let codes = decoder.mip(mip);
+                let codes = engine.mip(mip);
                 let (_, height, width) = codes.dim();
                 done += (height * width) as u64;
                 after_mip(done);
@@ -34,12 +32,11 @@ impl Decoded {
         Decoded { mips }
     }
 
-    /// Runs the model on every texel of one mip, which must be in the chain.
+    /// Decodes every texel of one mip, which must be in the chain.
     #[must_use]
     pub fn of_mip(asset: &Asset, mip: u8) -> Decoded {
-        let program = Program::compile(asset, Layout::Linear);
         Decoded {
-            mips: vec![Decoder::new(asset, &program).mip(mip)],
+            mips: vec![Engine::new(asset).mip(mip)],
         }
     }
 
@@ -47,15 +44,18 @@ impl Decoded {
     /// −1..=1 is mapped to 0..=1 as (real + 1) / 2, which is how image files hold normals.
     #[must_use]
     pub fn reals(&self, shape: &Shape) -> Vec<Array3<f32>> {
-        self.mips
-            .iter()
-            .map(|codes| {
-                Array3::from_shape_fn(codes.dim(), |(channel, row, column)| {
-                    real(codes[[channel, row, column]], shape.outputs[channel])
-                })
-            })
+        let mips = self.mips.iter();
+        mips.map(|codes| reals(codes.view(), &shape.outputs))
             .collect()
     }
+}
+
+/// Codes \[channel, row, column\] as reals, see [`Decoded::reals`]; one format a channel.
+#[must_use]
+pub fn reals(codes: ArrayView3<'_, i32>, formats: &[OutputFormat]) -> Array3<f32> {
+    Array3::from_shape_fn(codes.dim(), |(channel, row, column)| {
+        real(codes[[channel, row, column]], formats[channel])
+    })
 }
 
 /// What a code means, on 0..=1.

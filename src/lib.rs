@@ -39,3 +39,8 @@ pub mod study;
 pub mod texture_set;
 #[cfg(feature = "gpu")]
 pub mod twin_device;
+
+/// The book's chapter, so that its code is compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/src/decoding.md")]
+pub struct DecodingFromRust;

@@ -126,3 +126,36 @@ fn no_source_file_exceeds_five_hundred_lines() {
         }
     }
 }
+
+#[test]
+fn unsafe_code_is_in_the_engines_kernels_alone() {
+    let root = Path::new(ROOT);
+    let kernels = root.join("model/src/engine/kernel");
+    let folders = [
+        "src",
+        "isa/src",
+        "model/src",
+        "shaders/src",
+        "trainer/src",
+        "conformance/src",
+    ];
+    let mut in_kernels = 0;
+    for path in folders
+        .iter()
+        .flat_map(|folder| sources(&root.join(folder), "rs"))
+    {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let lines = text.lines().map(|line| line.split("//").next().unwrap());
+        let found = lines.filter(|code| {
+            let mut words = code.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+            words.any(|word| word == "unsafe")
+        });
+        let count = found.count();
+        if path.starts_with(&kernels) {
+            in_kernels += count;
+        } else {
+            assert_eq!(count, 0, "{}", path.display());
+        }
+    }
+    assert!(in_kernels > 0, "the search finds what it looks for");
+}

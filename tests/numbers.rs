@@ -193,3 +193,59 @@ fn samples_are_asked_for_in_every_way() {
         );
     }
 }
+
+#[test]
+fn a_certificate_fails_where_a_sum_may_leave_its_width() {
+    let folder = folder();
+    let asset = asset_in(folder.path());
+    let asset = asset.to_str().unwrap();
+    let certify = |options: &[&str]| {
+        let arguments = [&["certify", asset, "--json"], options].concat();
+        let output = ntmu(&arguments, folder.path());
+        let value: Value = serde_json::from_slice(&output.stdout).unwrap();
+        (output.status.code(), value)
+    };
+    let (code, proven) = certify(&["--witness", "witness.ntx"]);
+    assert_eq!(code, Some(0));
+    let layers = proven["layers"].as_array().unwrap();
+    let widths = layers
+        .iter()
+        .map(|layer| layer["sums"]["width"].as_u64().unwrap());
+    let width = widths.max().unwrap();
+    assert!((16..=32).contains(&width));
+    let narrower = |bits: u64| {
+        let text = ntmu::isa::profile::NAMED[0].1;
+        let text = text.replace("\nbits = 32", &format!("\nbits = {bits}"));
+        std::fs::write(folder.path().join("narrow.toml"), text).unwrap();
+        certify(&["--profile", "narrow.toml"]).0
+    };
+    assert_eq!(narrower(width), Some(0));
+    assert_eq!(narrower(width - 1), Some(1));
+
+    // The witness is an asset like any other, and its texel reaches what was promised.
+    let witness = &proven["witness"];
+    let place = ["x", "y", "mip"].map(|key| witness[key].to_string());
+    let [x, y, mip] = place.each_ref().map(String::as_str);
+    let texel = json(&ntmu(
+        &["texel", "witness.ntx", x, y, mip, "--json"],
+        folder.path(),
+    ));
+    let inputs = texel["inputs"].as_array().unwrap();
+    let file = std::fs::read(folder.path().join("witness.ntx")).unwrap();
+    let found = ntmu::isa::Asset::from_bytes(&file).unwrap();
+    let (row, steps) = (
+        witness["row"].as_u64().unwrap() as usize,
+        witness["after_products"].as_u64().unwrap() as usize,
+    );
+    let layer = &found.layers[0];
+    let integers = layer.integer().unwrap();
+    let products = integers
+        .row(row, layer.inputs)
+        .iter()
+        .zip(inputs)
+        .take(steps);
+    let sum = products.fold(i64::from(integers.bias[row]), |sum, (&weight, input)| {
+        sum + i64::from(weight) * input.as_i64().unwrap()
+    });
+    assert_eq!(Some(sum), witness["sum"].as_i64());
+}

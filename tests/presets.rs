@@ -19,7 +19,7 @@ fn trained(preset: &Preset, precision: Precision) -> Asset {
             refine: 4,
             integer: 2,
         }),
-        batch: 256,
+        batch: 768,
         precision,
         ..preset.config()
     };

@@ -6,6 +6,7 @@
 
 #![deny(unsafe_code)]
 
+pub mod engine;
 pub mod exec;
 pub mod place;
 pub mod request;

@@ -17,7 +17,8 @@ use std::path::PathBuf;
 pub(crate) struct Certify {
     /// The asset, an .ntx file.
     asset: PathBuf,
-    /// Also write the asset with other latents, which reach the widest sum of the first layer.
+    /// Also write the asset with other latents, which need every bit of the width that is certified
+    /// for the first layer.
     #[arg(long, value_name = "FILE")]
     witness: Option<PathBuf>,
     #[command(flatten)]

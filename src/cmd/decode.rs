@@ -4,11 +4,13 @@ use super::profile::ProfileChoice;
 use crate::Verdict;
 use crate::{console, files};
 use ndarray::{Axis, Slice};
-use ntmu::decoded::Decoded;
+use ntmu::decoded::reals;
 use ntmu::isa::Asset;
 use ntmu::isa::asset::Map;
-use ntmu::texture_set::{Depth, write_map};
+use ntmu::model::engine::Engine;
+use ntmu::texture_set::{Depth, MapWriter};
 use serde_json::json;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -65,14 +67,22 @@ impl Decode {
                 mip_count - 1
             );
         }
-        let bar = console::progress(asset.shape.texel_count(), "decoding");
-        let decoded = match self.mip {
-            None => Decoded::of(&asset, |done| bar.set_position(done)),
-            Some(mip) => Decoded::of_mip(&asset, mip),
-        };
-        bar.finish_and_clear();
+        let mips = self.mip.map_or(0..mip_count, |mip| mip..mip + 1);
         let depth = self.format.map(Format::depth);
-        let written = write_all(&asset, &decoded, self.mip, depth, &self.output)?;
+        let texels = mips.clone().map(|mip| texels_of(&asset, mip)).sum();
+        let bar = console::progress(texels, "decoding");
+        let engine = Engine::new(&asset);
+        let mut written = Vec::new();
+        for mip in mips {
+            // A folder holds images of one size, so that it can be read back as a texture set.
+            let folder = match self.mip {
+                None => self.output.join(format!("mip{mip}")),
+                Some(_) => self.output.clone(),
+            };
+            written.extend(write_mip(&engine, mip, depth, &folder)?);
+            bar.inc(texels_of(&asset, mip));
+        }
+        bar.finish_and_clear();
         if json {
             console::print_json(
                 &json!({ "profile": asset.profile.identity(), "written": written }),
@@ -90,36 +100,49 @@ impl Decode {
     }
 }
 
-fn write_all(
-    asset: &Asset,
-    decoded: &Decoded,
-    only_mip: Option<u8>,
+fn texels_of(asset: &Asset, mip: u8) -> u64 {
+    let (width, height) = asset.shape.mip_size(mip);
+    u64::from(width) * u64::from(height)
+}
+
+/// Decodes a mip band by band and writes each map as it comes, so that no more than a band is held.
+fn write_mip(
+    engine: &Engine<'_>,
+    mip: u8,
     depth: Option<Depth>,
     folder: &Path,
 ) -> anyhow::Result<Vec<PathBuf>> {
-    let (first_mip, is_chain) = (only_mip.unwrap_or(0), only_mip.is_none());
+    let asset = engine.asset();
+    files::make_folder(folder)?;
+    let (width, height) = asset.shape.mip_size(mip);
     let mut written = Vec::new();
-    for (mip, texels) in (first_mip..).zip(decoded.reals(&asset.shape)) {
-        // A folder holds images of one size, so that it can be read back as a texture set.
-        let folder = if is_chain {
-            folder.join(format!("mip{mip}"))
-        } else {
-            folder.to_owned()
-        };
-        files::make_folder(&folder)?;
-        for map in &asset.metadata.maps {
-            let depth = depth.unwrap_or(stored_depth(map));
-            let channels =
-                usize::from(map.first_channel)..usize::from(map.first_channel + map.channel_count);
-            let extension = depth.extension();
-            let path = folder.join(format!("{}.{extension}", map.name));
-            write_map(
-                &path,
-                &texels.slice_axis(Axis(0), Slice::from(channels)),
-                depth,
-            )?;
-            written.push(path);
+    let mut writers = Vec::new();
+    for map in &asset.metadata.maps {
+        let depth = depth.unwrap_or(stored_depth(map));
+        let channels = usize::from(map.channel_count);
+        let path = folder.join(format!("{}.{}", map.name, depth.extension()));
+        let shape = (channels, height as usize, width as usize);
+        writers.push((MapWriter::create(&path, shape, depth)?, channels_of(map)));
+        written.push(path);
+    }
+    let mut outcome = Ok(());
+    engine.bands(mip, |_, codes| {
+        for (writer, channels) in &mut writers {
+            if outcome.is_ok() {
+                let codes = codes.slice_axis(Axis(0), Slice::from(channels.clone()));
+                let formats = &asset.shape.outputs[channels.clone()];
+                outcome = writer.rows(&reals(codes, formats).view());
+            }
         }
+    });
+    outcome?;
+    for (writer, _) in writers {
+        writer.finish()?;
     }
     Ok(written)
+}
+
+fn channels_of(map: &Map) -> Range<usize> {
+    let first = usize::from(map.first_channel);
+    first..first + usize::from(map.channel_count)
 }

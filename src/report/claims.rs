@@ -1,11 +1,11 @@
 //! Claims: what is promised of the model, beside what was observed.
 
 use super::number::{integer, percent, significant};
-use crate::study::Findings;
+use crate::study::{EngineStudy, Findings};
 use maud::{Markup, html};
 
 /// The three claims at the texels that were tried.
-pub(super) fn section(found: &Findings) -> Markup {
+pub(super) fn section(found: &Findings, engine: &EngineStudy) -> Markup {
     html! {
         section #claims {
             h2 { "Claims" }
@@ -20,6 +20,10 @@ pub(super) fn section(found: &Findings) -> Markup {
                     " The last two leave out " (integer(found.overflowing as u64)) " texels whose sums went \
                      beyond their width."
                 }
+            }
+            p {
+                "The engine (" (engine.path) ") that decoded the images differs from the reference at "
+                (integer(engine.differing as u64)) " of " (integer(engine.texels as u64)) " texels."
             }
             div.pair { (stages(found)) (channels(found)) }
         }

@@ -106,7 +106,7 @@ pub fn html(study: &Study, pictures: &[MapPicture<'_>]) -> Result<String, Report
                     (maps)
                     (quality::section(study))
                     (exactness::section(&study.oracle))
-                    (claims::section(&study.claims))
+                    (claims::section(&study.claims, &study.engine))
                     (timing)
                     (precision::section(study))
                     (in_between::section(study))

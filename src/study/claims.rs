@@ -10,10 +10,14 @@ const CLAIM_TEXELS: usize = 512;
 /// Tries the claims at texels of every mip.
 #[must_use]
 pub fn try_claims(asset: &Asset) -> Findings {
+    findings(asset, &sample(asset))
+}
+
+/// Texels of every mip, evenly spread.
+pub(super) fn sample(asset: &Asset) -> Vec<Request> {
     let requests: Vec<Request> = (0..asset.shape.mip_count)
         .flat_map(|mip| Request::blocks(&asset.shape, mip))
         .collect();
     let step = requests.len().div_ceil(CLAIM_TEXELS);
-    let sample: Vec<Request> = requests.into_iter().step_by(step).collect();
-    findings(asset, &sample)
+    requests.into_iter().step_by(step).collect()
 }

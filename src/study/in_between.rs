@@ -6,10 +6,8 @@
 use crate::decoded::real;
 use ndarray::{Array3, ArrayView2, Axis};
 use ntmu_isa::Asset;
-use ntmu_isa::Program;
-use ntmu_isa::layout::Layout;
 use ntmu_isa::sampler::{Detail, MipBlend, MipFilter, Order, SampleRequest, Sampler, SamplerError};
-use ntmu_model::exec::Decoder;
+use ntmu_model::engine::Engine;
 use ntmu_model::sampler::Texture;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -60,8 +58,7 @@ pub fn in_between(
     reference: &[Array3<f32>],
     mut after_level: impl FnMut(u64),
 ) -> Result<Vec<InBetween>, SamplerError> {
-    let program = Program::compile(asset, Layout::Linear);
-    let decoder = Decoder::new(asset, &program);
+    let engine = Engine::new(asset);
     let linear = Sampler::default();
     let ways = [
         ("two decodes", linear.clone()),
@@ -103,7 +100,7 @@ pub fn in_between(
             decodes: 0.0,
         });
         for (way, sampler) in &ways {
-            let texture = Texture::new(&decoder, sampler.clone())?;
+            let texture = Texture::new(&engine, sampler.clone())?;
             let samples: Vec<_> = places
                 .par_iter()
                 .map(|place| {

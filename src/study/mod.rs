@@ -3,6 +3,7 @@
 //! `ntmu study` prints it, writes it as JSON, and draws it as a report.
 
 mod claims;
+mod engine;
 mod in_between;
 mod oracle;
 mod sweep;
@@ -12,6 +13,7 @@ mod variants;
 mod vectors;
 
 pub use claims::try_claims;
+pub use engine::{EngineStudy, compare_with_reference};
 pub use in_between::{InBetween, in_between, in_between_points};
 pub use ntmu_conformance::claims::Findings;
 pub use oracle::{OracleStudy, compare_with_oracle};
@@ -86,7 +88,9 @@ pub struct Study {
     pub quality: Option<Quality>,
     /// Against the real-number truth.
     pub oracle: OracleStudy,
-    /// The three claims, at a sample of texels.
+    /// The engine against the reference, at a sample of texels.
+    pub engine: EngineStudy,
+    /// The three claims, at the same texels.
     pub claims: Findings,
     /// Against the GPU twin.
     pub twin: TwinStudy,
@@ -101,10 +105,11 @@ pub struct Study {
 }
 
 impl Study {
-    /// Whether every check held: the twin, if it ran, agreed on every code, no code was farther
+    /// Whether every check held: the twin, if it ran, agreed on every code, the engine agreed with the
+    /// reference, no code was farther
     /// from the oracle than the derived bound allows, and every claim is true of its sample.
     #[must_use]
     pub fn holds(&self) -> bool {
-        self.twin.holds() && self.oracle.holds() && self.claims.hold()
+        self.twin.holds() && self.oracle.holds() && self.engine.holds() && self.claims.hold()
     }
 }

@@ -21,7 +21,7 @@ mod write;
 pub use error::TextureSetError;
 pub use mips::{mip_chain, mip_count};
 pub use ntmu_isa::asset::Encoding;
-pub use write::{Depth, WriteMapError, write_map};
+pub use write::{Depth, MapWriter, WriteMapError, write_map};
 
 /// Most channels a set may have: the widest output the synthesizer is specified for.
 pub const MAX_CHANNELS: usize = 16;

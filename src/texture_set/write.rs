@@ -1,11 +1,10 @@
 //! One map at one mip to an image file.
 
+use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
-use ndarray::ArrayView3;
+use ndarray::{Array3, ArrayView3, Axis, Slice};
 use tempfile::NamedTempFile;
 
 use super::exr_file;
@@ -90,97 +89,192 @@ pub enum WriteMapError {
 
 /// Writes `values` (`[channel, row, column]`, 1 to 4 channels, 0..=1) to `path`.
 ///
-/// One channel is written as grey, two as grey and alpha, three as RGB, four as RGBA. The image is
-/// written beside `path` and renamed when complete, so `path` never holds half a file.
+/// See [`MapWriter`], of which this is the use with all rows at once.
 ///
 /// # Errors
 ///
-/// [`WriteMapError`]: more than 4 channels or no texel, a value outside 0..=1, an extension that
-/// does not go with `depth`, or a failure to write.
+/// As [`MapWriter`]'s.
 pub fn write_map(
     path: &Path,
     values: &ArrayView3<'_, f32>,
     depth: Depth,
 ) -> Result<(), WriteMapError> {
-    let (channels, height, width) = values.dim();
-    let small = u32::try_from(width).ok().zip(u32::try_from(height).ok());
-    let (Some(size), 1..=4) = (small.filter(|&(w, h)| w > 0 && h > 0), channels) else {
-        return Err(WriteMapError::Shape {
+    let mut writer = MapWriter::create(path, values.dim(), depth)?;
+    writer.rows(values)?;
+    writer.finish()
+}
+
+/// One map on its way to a file, rows from the top.
+///
+/// One channel is written as grey, two as grey and alpha, three as RGB, four as RGBA. The image is
+/// written beside its path and renamed by [`MapWriter::finish`], so the path never holds half a file.
+/// A PNG needs memory for some rows; an EXR is held until it is finished.
+pub struct MapWriter {
+    path: PathBuf,
+    file: NamedTempFile,
+    /// Channels, rows, columns.
+    shape: (usize, usize, usize),
+    rows: usize,
+    sink: Sink,
+}
+
+enum Sink {
+    Eight(PngRows),
+    Sixteen(PngRows),
+    Float(Array3<f32>),
+}
+
+type PngRows = png::StreamWriter<'static, BufWriter<File>>;
+
+impl MapWriter {
+    /// Begins a file for `shape` (channels, rows, columns).
+    ///
+    /// # Errors
+    ///
+    /// [`WriteMapError`]: more than 4 channels or no texel, an extension that does not go with
+    /// `depth`, or a failure to write.
+    pub fn create(
+        path: &Path,
+        shape: (usize, usize, usize),
+        depth: Depth,
+    ) -> Result<MapWriter, WriteMapError> {
+        let (channels, height, width) = shape;
+        let small = u32::try_from(width).ok().zip(u32::try_from(height).ok());
+        let (Some(size), 1..=4) = (small.filter(|&(w, h)| w > 0 && h > 0), channels) else {
+            return Err(WriteMapError::Shape {
+                path: path.to_owned(),
+                channels,
+                width,
+                height,
+            });
+        };
+        let allowed = depth.extension();
+        if !path
+            .extension()
+            .is_some_and(|found| found.eq_ignore_ascii_case(allowed))
+        {
+            return Err(WriteMapError::Extension {
+                path: path.to_owned(),
+                allowed,
+            });
+        }
+        let failed = |found: String| failed(path, found);
+        let file = beside::file_for(path).map_err(|e| failed(e.to_string()))?;
+        let png = |bits| png_rows(&file, size, channels, bits).map_err(failed);
+        let sink = match depth {
+            Depth::Eight => Sink::Eight(png(png::BitDepth::Eight)?),
+            Depth::Sixteen => Sink::Sixteen(png(png::BitDepth::Sixteen)?),
+            Depth::Float => Sink::Float(Array3::zeros(shape)),
+        };
+        Ok(MapWriter {
             path: path.to_owned(),
-            channels,
-            width,
-            height,
-        });
-    };
-    if let Some(((channel, row, column), &found)) = values
-        .indexed_iter()
-        .find(|(_, v)| !(0.0..=1.0).contains(*v))
-    {
-        return Err(WriteMapError::Range {
-            path: path.to_owned(),
-            channel,
-            row,
-            column,
-            found,
-        });
+            file,
+            shape,
+            rows: 0,
+            sink,
+        })
     }
-    let allowed = depth.extension();
-    if !path
-        .extension()
-        .is_some_and(|found| found.eq_ignore_ascii_case(allowed))
-    {
-        return Err(WriteMapError::Extension {
-            path: path.to_owned(),
-            allowed,
-        });
+
+    /// Writes the next rows (`[channel, row, column]`, 0..=1).
+    ///
+    /// # Errors
+    ///
+    /// [`WriteMapError`]: a value outside 0..=1, rows of another shape or beyond the last, or a
+    /// failure to write.
+    pub fn rows(&mut self, values: &ArrayView3<'_, f32>) -> Result<(), WriteMapError> {
+        let (channels, rows, width) = values.dim();
+        let rows_after = self.rows + rows;
+        if (channels, width) != (self.shape.0, self.shape.2) || rows_after > self.shape.1 {
+            return Err(WriteMapError::Shape {
+                path: self.path.clone(),
+                channels,
+                width,
+                height: rows_after,
+            });
+        }
+        if let Some(((channel, row, column), &found)) = values
+            .indexed_iter()
+            .find(|(_, v)| !(0.0..=1.0).contains(*v))
+        {
+            return Err(WriteMapError::Range {
+                path: self.path.clone(),
+                channel,
+                row: self.rows + row,
+                column,
+                found,
+            });
+        }
+        let written = match &mut self.sink {
+            Sink::Eight(out) => {
+                let codes = interleaved(values).map(|v| (v * 255.0).round() as u8);
+                out.write_all(&codes.collect::<Vec<u8>>())
+            }
+            Sink::Sixteen(out) => {
+                let codes = interleaved(values).map(|v| (v * 65535.0).round() as u16);
+                out.write_all(&codes.flat_map(u16::to_be_bytes).collect::<Vec<u8>>())
+            }
+            Sink::Float(held) => {
+                held.slice_axis_mut(Axis(1), Slice::from(self.rows..rows_after))
+                    .assign(values);
+                Ok(())
+            }
+        };
+        self.rows = rows_after;
+        written.map_err(|e| failed(&self.path, e.to_string()))
     }
-    let failed = |found: String| WriteMapError::Failed {
+
+    /// Completes the file and puts it in its place.
+    ///
+    /// # Errors
+    ///
+    /// [`WriteMapError`]: rows are missing, or a failure to write.
+    pub fn finish(mut self) -> Result<(), WriteMapError> {
+        let failed = |found: String| failed(&self.path, found);
+        if self.rows != self.shape.1 {
+            return Err(failed(format!("{} of {} rows", self.rows, self.shape.1)));
+        }
+        match self.sink {
+            Sink::Eight(out) | Sink::Sixteen(out) => {
+                out.finish().map_err(|e| failed(e.to_string()))?;
+            }
+            Sink::Float(held) => {
+                exr_file::write(&mut self.file, held.view()).map_err(|e| failed(e.to_string()))?;
+            }
+        }
+        self.file
+            .persist(&self.path)
+            .map_err(|e| failed(e.error.to_string()))?;
+        Ok(())
+    }
+}
+
+fn failed(path: &Path, found: String) -> WriteMapError {
+    WriteMapError::Failed {
         path: path.to_owned(),
         found,
-    };
-    let mut file = beside::file_for(path).map_err(|e| failed(e.to_string()))?;
-    match depth {
-        Depth::Eight => {
-            let codes: Vec<u8> = interleaved(values)
-                .map(|v| (v * 255.0).round() as u8)
-                .collect();
-            write_png(
-                &mut file,
-                &codes,
-                size,
-                [
-                    ExtendedColorType::L8,
-                    ExtendedColorType::La8,
-                    ExtendedColorType::Rgb8,
-                    ExtendedColorType::Rgba8,
-                ][channels - 1],
-            )
-            .map_err(failed)?;
-        }
-        Depth::Sixteen => {
-            let codes: Vec<u8> = interleaved(values)
-                .flat_map(|v| ((v * 65535.0).round() as u16).to_ne_bytes())
-                .collect();
-            write_png(
-                &mut file,
-                &codes,
-                size,
-                [
-                    ExtendedColorType::L16,
-                    ExtendedColorType::La16,
-                    ExtendedColorType::Rgb16,
-                    ExtendedColorType::Rgba16,
-                ][channels - 1],
-            )
-            .map_err(failed)?;
-        }
-        Depth::Float => {
-            exr_file::write(&mut file, values.view()).map_err(|e| failed(e.to_string()))?;
-        }
     }
-    file.persist(path)
-        .map_err(|e| failed(e.error.to_string()))?;
-    Ok(())
+}
+
+fn png_rows(
+    file: &NamedTempFile,
+    (width, height): (u32, u32),
+    channels: usize,
+    depth: png::BitDepth,
+) -> Result<PngRows, String> {
+    let out = BufWriter::new(file.reopen().map_err(|e| e.to_string())?);
+    let mut encoder = png::Encoder::new(out, width, height);
+    encoder.set_color(
+        [
+            png::ColorType::Grayscale,
+            png::ColorType::GrayscaleAlpha,
+            png::ColorType::Rgb,
+            png::ColorType::Rgba,
+        ][channels - 1],
+    );
+    encoder.set_depth(depth);
+    encoder.set_compression(png::Compression::Balanced);
+    let writer = encoder.write_header().map_err(|e| e.to_string())?;
+    writer.into_stream_writer().map_err(|e| e.to_string())
 }
 
 /// Values in the order of an image file: rows, columns, channels. In f64, so that the product
@@ -190,19 +284,6 @@ fn interleaved<'a>(values: &ArrayView3<'a, f32>) -> impl Iterator<Item = f64> + 
         .permuted_axes([1, 2, 0])
         .into_iter()
         .map(|&v| f64::from(v))
-}
-
-fn write_png(
-    file: &mut NamedTempFile,
-    codes: &[u8],
-    (width, height): (u32, u32),
-    color: ExtendedColorType,
-) -> Result<(), String> {
-    let mut out = BufWriter::new(file);
-    PngEncoder::new_with_quality(&mut out, CompressionType::Default, FilterType::Adaptive)
-        .write_image(codes, width, height, color)
-        .map_err(|e| e.to_string())?;
-    out.flush().map_err(|e| e.to_string())
 }
 
 #[cfg(test)]

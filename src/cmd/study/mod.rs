@@ -106,6 +106,7 @@ fn study(asset: &Asset, reference: Option<&[Array3<f32>]>) -> anyhow::Result<(Re
     bar.finish_and_clear();
 
     let bar = console::progress(1, "claims");
+    let engine = study::compare_with_reference(asset);
     let claims = study::try_claims(asset);
     bar.finish_and_clear();
 
@@ -139,6 +140,7 @@ fn study(asset: &Asset, reference: Option<&[Array3<f32>]>) -> anyhow::Result<(Re
             asset,
             quality,
             oracle,
+            engine,
             claims,
             twin,
             timing,

@@ -22,6 +22,11 @@ pub(super) fn results(results: &Results) {
         console::print(&crate::cmd::compare::table(quality));
     }
     print_oracle(results);
+    let engine = &results.engine;
+    console::print(&format!(
+        "engine ({}) against the reference: {} of {} texels differ",
+        engine.path, engine.differing, engine.texels
+    ));
     print_claims(&results.claims);
     match &results.twin {
         TwinStudy::Ran {

@@ -6,8 +6,8 @@ mod parts;
 use super::MapPicture;
 use crate::quality::{Figures, MapQuality, Quality};
 use crate::study::{
-    AssetStudy, Charge, Findings, InBetween, OracleStudy, Study, SweepPoint, TimingRow, TwinStudy,
-    Variant, VariantOutcome,
+    AssetStudy, Charge, EngineStudy, Findings, InBetween, OracleStudy, Study, SweepPoint,
+    TimingRow, TwinStudy, Variant, VariantOutcome,
 };
 use ndarray::Array3;
 use ntmu_conformance::claims::{Channel, Distance};
@@ -75,6 +75,11 @@ fn study() -> Study {
             rms: 0.2961,
             typical: 0.2914,
             bound: 41.7,
+        },
+        engine: EngineStudy {
+            path: "some path".to_owned(),
+            texels: 512,
+            differing: 0,
         },
         claims: Findings {
             profile: "nt-d3d11@0123456789abcdef".to_owned(),
