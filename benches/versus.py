@@ -1,20 +1,31 @@
 #!/usr/bin/env python3
 """The engine beside ONNX Runtime and PyTorch: same networks, same texels, same threads, one run.
 
-    python3 benches/versus.py [--rounds N] [--no-torch] [--venv DIR] [--json FILE]
+    python3 benches/versus.py [--seconds S] [--no-torch] [--venv DIR] [--json FILE]
 
-Makes a virtual environment with onnxruntime, onnx, numpy and (unless --no-torch; its wheel brings
-gigabytes of CUDA libraries that are not used) torch, exports the networks and a batch of inputs
-from the engine's own benchmark, and measures. Every figure is the best of many repetitions, and the
-repetitions of all contestants take turns. ONNX Runtime computes each network in every int8 form that
-it has, and the fastest of them counts. Both round to nearest, ONNX Runtime in f32 with ties to even,
-the engine exactly with ties up; the share of codes that differ and the largest difference are printed.
-A difference of 1 in one layer may grow in those behind it.
+Runs `cargo bench -p ntmu-model`, whose criterion results it reads, and measures the others before and
+behind it on the batches that the benchmark exports. ONNX Runtime computes the int8 networks in every
+int8 form that it has, and the fp16 networks in f32 and in fp16; PyTorch computes both kinds in f32, fp16
+and bf16, and the int8 networks with its quantised operators. The fastest of each counts. ONNX Runtime's
+QLinearMatMul has no bias, so it computes another network; its ratio stands in a line of its own.
+
+Two ratios are printed against each contestant. `row-major` is like for like: inputs and codes lie texel
+after texel, as the others take and give them. `blocked` is the engine on its own order of inputs and
+codes, as the decoder uses it, against the others' only order.
+
+The figure of a contestant, the engine included, is its fastest repetition, because other work on the
+machine can only slow one down; criterion's mean is in the JSON beside it. Both int8 engines round to
+nearest, ONNX Runtime in f32 with ties to even, the engine exactly with ties up; the share of codes that
+differ and the largest difference are printed. A difference of 1 in one layer may grow in those behind.
+
+The environment goes to `versus/` under the target folder: numpy, onnx, onnxruntime and, unless
+--no-torch, the CPU build of torch.
 """
 
 import argparse
 import json
 import os
+import platform
 import subprocess
 import sys
 import time
@@ -23,36 +34,64 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 
 
+TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+
+TORCH_INDEX = "https://download.pytorch.org/whl/cpu"
+
+
 def own_environment(arguments):
     """Runs this script again inside the virtual environment, which is made first if need be."""
     venv = Path(arguments.venv)
     python = venv / "bin" / "python3"
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True)
-    wanted = ["numpy", "onnx", "onnxruntime"] + ([] if arguments.no_torch else ["torch"])
-    have = subprocess.run([python, "-m", "pip", "list", "--format=json"], check=True, capture_output=True)
-    have = {package["name"] for package in json.loads(have.stdout)}
-    missing = [name for name in wanted if name not in have]
+
+    def installed():
+        listed = subprocess.run([python, "-m", "pip", "list", "--format=json"], check=True, capture_output=True)
+        return {package["name"] for package in json.loads(listed.stdout)}
+
+    missing = [name for name in ("numpy", "onnx", "onnxruntime") if name not in installed()]
     if missing:
         print("installing", *missing, "into", venv, file=sys.stderr)
         subprocess.run([python, "-m", "pip", "install", "-q", *missing], check=True)
+    if not arguments.no_torch and "torch" not in installed():
+        print("installing torch into", venv, file=sys.stderr)
+        pip = [python, "-m", "pip", "install", "-q", "torch"]
+        cpu_only = subprocess.run([*pip, "--index-url", TORCH_INDEX], capture_output=True)
+        if cpu_only.returncode != 0 and subprocess.run(pip).returncode != 0:
+            print("torch: no wheel could be installed; its figures are left out", file=sys.stderr)
     os.environ["NTMU_VERSUS"] = "1"
     os.execv(python, [str(python), *sys.argv])
 
 
 def parse():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=60, help="repetitions of every figure")
-    parser.add_argument("--threads", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--seconds", type=float, default=0.25, help="time for every figure of a contestant, twice")
+    parser.add_argument("--threads", type=int, nargs="+", default=[1, 2], choices=[1, 2])
     parser.add_argument("--no-torch", action="store_true", help="leave PyTorch out")
-    parser.add_argument("--venv", default=str(Path.home() / ".cache" / "ntmu-versus"))
-    parser.add_argument("--json", help="write the figures to this file")
+    parser.add_argument("--venv", default=str(TARGET / "versus" / "environment"))
+    parser.add_argument("--json", default=str(ROOT / "benches" / "results" / "versus.json"))
     return parser.parse_args()
 
 
-def cargo_bench(*words):
+def cargo_bench(environment=None, *words):
     command = ["cargo", "bench", "-q", "-p", "ntmu-model", "--bench", "engine", "--", *words]
-    return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    environment = {**os.environ, **(environment or {})}
+    subprocess.run(command, cwd=ROOT, env=environment, check=True, stdout=sys.stderr)
+
+
+def criterion():
+    """Seconds of every criterion benchmark: {(group, name, parameter): {"mean", "fastest"}}."""
+    figures = {}
+    for path in (TARGET / "criterion").glob("**/new/estimates.json"):
+        about = json.loads((path.parent / "benchmark.json").read_text())
+        sample = json.loads((path.parent / "sample.json").read_text())
+        each = [t / n for t, n in zip(sample["times"], sample["iters"])]
+        mean = json.loads(path.read_text())["mean"]["point_estimate"]
+        key = (about["group_id"], about["function_id"], about["value_str"])
+        elements = (about["throughput"] or {}).get("Elements")
+        figures[key] = {"mean": mean * 1e-9, "fastest": min(each) * 1e-9, "elements": elements}
+    return figures
 
 
 class Network:
@@ -65,15 +104,21 @@ class Network:
         self.name = name
         self.batch = data["batch"]
         self.layers = data["layers"]
+        self.half = data["half"]
+        self.macs = data["macs"]
         for layer in self.layers:
             shape = (layer["outputs"], layer["inputs"])
+            if self.half:
+                layer["weights"] = np.array(layer["weights"], np.float32).reshape(shape)
+                layer["bias"] = np.array(layer["bias"], np.float32)
+                continue
             layer["weights"] = np.array(layer["weights"], np.int8).reshape(shape)
             layer["bias"] = np.array(layer["bias"], np.int32)
             layer["scales"] = np.array(layer["scales"], np.float64)
         inputs = self.layers[0]["inputs"]
         self.inputs = np.fromfile(folder / f"{name}.inputs", np.int8).reshape(self.batch, inputs)
         self.codes = np.fromfile(folder / f"{name}.codes", np.uint8).reshape(self.batch, -1)
-        self.macs = sum(layer["inputs"] * layer["outputs"] for layer in self.layers)
+        self.reals = self.inputs.astype(np.float32) / 128
 
 
 def onnx_model(network, form):
@@ -159,26 +204,67 @@ def onnx_model(network, form):
     return helper.make_model(graph, opset_imports=opsets, ir_version=9).SerializeToString()
 
 
+NO_BIAS = "onnxruntime QLinearMatMul"
 FORMS = ["QGemm", "QDQ", "MatMulInteger", "QLinearMatMul"]
+
+
+def onnx_float_model(network, is_half):
+    """An fp16 network as an ONNX graph of Gemm and Relu."""
+    import numpy as np
+    from onnx import TensorProto, helper, numpy_helper
+
+    kind, element = (np.float16, TensorProto.FLOAT16) if is_half else (np.float32, TensorProto.FLOAT)
+    nodes, constants, x = [], [], "x"
+    for index, layer in enumerate(network.layers):
+        is_last = index + 1 == len(network.layers)
+        constants.append(numpy_helper.from_array(np.ascontiguousarray(layer["weights"].T.astype(kind)), f"w{index}"))
+        constants.append(numpy_helper.from_array(layer["bias"].astype(kind), f"b{index}"))
+        y = "y" if is_last else f"g{index}"
+        nodes.append(helper.make_node("Gemm", [x, f"w{index}", f"b{index}"], [y]))
+        if not is_last:
+            nodes.append(helper.make_node("Relu", [y], [f"r{index}"]))
+            y = f"r{index}"
+        x = y
+    shapes = [[network.batch, network.layers[0]["inputs"]], [network.batch, network.layers[-1]["outputs"]]]
+    graph = helper.make_graph(nodes, network.name, [helper.make_tensor_value_info("x", element, shapes[0])],
+                              [helper.make_tensor_value_info("y", element, shapes[1])], constants)
+    return helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9).SerializeToString()
+
+
+def onnx_session(model, threads):
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 3
+    return onnxruntime.InferenceSession(model, options, ["CPUExecutionProvider"])
 
 
 def onnx_contestants(network, threads):
     import numpy as np
-    import onnxruntime
 
+    if network.half:
+        for form, is_half in [("f32", False), ("fp16", True)]:
+            session = onnx_session(onnx_float_model(network, is_half), threads)
+            x = network.reals.astype(np.float16 if is_half else np.float32)
+            codes = np.clip(np.rint(session.run(None, {"x": x})[0].astype(np.float64) * 255), 0, 255)
+            yield f"onnxruntime {form}", apart(codes, network), (lambda s=session, x=x: s.run(None, {"x": x}))
+        return
     x = (network.inputs.astype(np.int16) + 128).astype(np.uint8)
     for form in FORMS:
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = threads
-        options.inter_op_num_threads = 1
-        options.log_severity_level = 3
-        session = onnxruntime.InferenceSession(onnx_model(network, form), options, ["CPUExecutionProvider"])
-        codes = session.run(None, {"x": x})[0].astype(np.int16)
-        agreement = None
-        if form != "QLinearMatMul":
-            apart = np.abs(codes - network.codes.astype(np.int16))
-            agreement = {"differ": float((apart > 0).mean()), "largest": int(apart.max())}
+        session = onnx_session(onnx_model(network, form), threads)
+        codes = session.run(None, {"x": x})[0]
+        agreement = None if form == "QLinearMatMul" else apart(codes, network)
         yield f"onnxruntime {form}", agreement, (lambda session=session: session.run(None, {"x": x}))
+
+
+def apart(codes, network):
+    """How far codes are from the engine's."""
+    import numpy as np
+
+    distance = np.abs(codes.astype(np.int16) - network.codes.astype(np.int16))
+    return {"differ": float((distance > 0).mean()), "largest": int(distance.max())}
 
 
 def torch_contestants(network, threads):
@@ -196,10 +282,11 @@ def torch_contestants(network, threads):
             values.append(x)
         return x
 
-    for name, dtype in [("f32", torch.float32), ("bf16", torch.bfloat16), ("f16", torch.float16)]:
-        weights = [torch.tensor(layer["weights"].astype(np.float32) / 1024).to(dtype) for layer in network.layers]
+    for name, dtype in [("f32", torch.float32), ("bf16", torch.bfloat16), ("fp16", torch.float16)]:
+        unit = 1 if network.half else 1024
+        weights = [torch.tensor(layer["weights"].astype(np.float32) / unit).to(dtype) for layer in network.layers]
         bias = [torch.zeros(layer["outputs"], dtype=dtype) for layer in network.layers]
-        x = torch.tensor(network.inputs.astype(np.float32) / 128).to(dtype)
+        x = torch.tensor(network.reals).to(dtype)
         last = len(weights) - 1
 
         def linear(index, x, weights=weights, bias=bias):
@@ -212,6 +299,8 @@ def torch_contestants(network, threads):
 
         yield f"torch {name}", None, run
 
+    if network.half:
+        return
     for engine in [e for e in ("x86", "fbgemm", "onednn") if e in torch.backends.quantized.supported_engines]:
         torch.backends.quantized.engine = engine
         ops = torch.ops.quantized
@@ -241,63 +330,148 @@ def torch_contestants(network, threads):
         yield f"torch int8 {engine}", None, run
 
 
+# A contestant that takes longer for one batch is no contestant.
+SLOWEST = 0.75
+
+
+def contestants(networks, threads, with_torch):
+    """Everything that computes the networks, with an agreement where the codes are the same ones."""
+    for network in networks:
+        sources = [onnx_contestants(network, threads)]
+        if with_torch:
+            sources.append(torch_contestants(network, threads))
+        for source in sources:
+            try:
+                for name, agreement, run in source:
+                    start = time.perf_counter()
+                    run()
+                    seconds = time.perf_counter() - start
+                    if seconds > SLOWEST:
+                        print(f"{network.name}: {name} left out: one run takes {seconds:.1f} s", file=sys.stderr)
+                        continue
+                    yield {"shape": network.name, "threads": threads, "what": name, "macs": network.macs,
+                           "batch": network.batch, "agreement": agreement, "seconds": float("inf"), "run": run}
+            except (RuntimeError, NotImplementedError) as error:
+                print(f"{network.name}: left out: {str(error).splitlines()[0]}", file=sys.stderr)
+
+
+def measure(group, threads, seconds, with_torch):
+    """The fastest repetition of each contestant, and of those measured before."""
+    if with_torch:
+        import torch
+
+        torch.set_num_threads(threads)
+    for contestant in group:
+        end = time.perf_counter() + seconds
+        while (start := time.perf_counter()) < end:
+            contestant["run"]()
+            contestant["seconds"] = min(contestant["seconds"], time.perf_counter() - start)
+
+
+def conditions(with_torch):
+    import numpy
+    import onnxruntime
+
+    cpuinfo = Path("/proc/cpuinfo")
+    keys = ("model name", "cpu family", "model\t")
+    lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
+    facts = [line.split(":")[1].strip() for line in lines if line.startswith(keys)]
+    cpu = " ".join(dict.fromkeys(facts)) or platform.processor()
+    versions = {"onnxruntime": onnxruntime.__version__, "numpy": numpy.__version__, "python": platform.python_version(),
+                "rustc": subprocess.run(["rustc", "--version"], capture_output=True, text=True).stdout.strip()}
+    if with_torch:
+        import torch
+
+        versions["torch"] = torch.__version__
+    return {"cpu": cpu, "cpus": os.cpu_count(), "system": f"{platform.system()} {platform.machine()}", "versions": versions,
+            "load_average": os.getloadavg(), "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
+
+
 def main():
     arguments = parse()
     if "NTMU_VERSUS" not in os.environ:
         own_environment(arguments)
-    folder = ROOT / "target" / "versus"
+    with_torch = not arguments.no_torch
+    if with_torch:
+        try:
+            import torch  # noqa: F401
+        except ImportError:
+            print("torch is not there; its figures are left out", file=sys.stderr)
+            with_torch = False
+    before = conditions(with_torch)
+    folder = TARGET / "versus" / "networks"
     folder.mkdir(parents=True, exist_ok=True)
-    cargo_bench("--export", str(folder))
+    for old in folder.glob("*"):
+        old.unlink()
+    cargo_bench({"NTMU_EXPORT": str(folder)})
     networks = [Network(folder, path.stem) for path in sorted(folder.glob("*.json"))]
-    figures = []
-    for threads in arguments.threads:
-        contestants = []
-        for network in networks:
-            sources = list(onnx_contestants(network, threads))
-            if not arguments.no_torch:
-                sources += list(torch_contestants(network, threads))
-            for name, agreement, run in sources:
-                contestants.append({"shape": network.name, "threads": threads, "what": name, "macs": network.macs,
-                                    "batch": network.batch, "agreement": agreement, "seconds": float("inf"), "run": run})
-        # The engine is measured before and after: whatever else the machine does must last to matter.
-        half = str(max(arguments.rounds // 2, 1))
-        engine = [json.loads(cargo_bench("--rounds", half, "--only", '"what":"mlp"', f'"threads":{threads}'))]
-        for _ in range(arguments.rounds):
-            for contestant in contestants:
-                start = time.perf_counter()
-                contestant["run"]()
-                contestant["seconds"] = min(contestant["seconds"], time.perf_counter() - start)
-        engine.append(json.loads(cargo_bench("--rounds", half, "--only", '"what":"mlp"', f'"threads":{threads}')))
-        best = {}
-        for figure in (f for half in engine for f in half["figures"]):
-            key = (figure["shape"], "ntmu " + figure["path"])
-            best[key] = min(best.get(key, float("inf")), figure["seconds"])
-        for (shape, what), seconds in best.items():
-            network = next(n for n in networks if n.name == shape)
-            figures.append({"shape": shape, "threads": threads, "what": what, "macs": network.macs,
-                            "batch": network.batch, "agreement": None, "seconds": seconds})
-        for contestant in contestants:
-            del contestant["run"]
-            figures.append(contestant)
-    report(figures)
-    if arguments.json:
-        Path(arguments.json).write_text(json.dumps(figures, indent=1) + "\n")
+    others = {threads: list(contestants(networks, threads, with_torch)) for threads in arguments.threads}
+    # Before and after the engine: whatever else the machine does must last to matter.
+    for threads, group in others.items():
+        measure(group, threads, arguments.seconds, with_torch)
+    cargo_bench()
+    for threads, group in others.items():
+        measure(group, threads, arguments.seconds, with_torch)
+    ours = criterion()
+    figures = [{key: value for key, value in c.items() if key != "run"} for group in others.values() for c in group]
+    for network in networks:
+        for threads in arguments.threads:
+            for group, order in [("mlp", "row-major"), ("blocked", "blocked")]:
+                found = ours[group, network.name, str(threads)]
+                figures.append({"shape": network.name, "threads": threads, "what": f"ntmu {order}",
+                                "macs": network.macs, "batch": network.batch, "agreement": None,
+                                "seconds": found["fastest"], "mean_seconds": found["mean"]})
+    peaks = {}
+    for (group, name, _), found in ours.items():
+        if group == "peak":
+            peaks[name] = max(peaks.get(name, 0), found["elements"] / found["fastest"])
+    peak = max(peaks.values(), default=None)
+    report(figures, peak)
+    engine = [{"group": g, "name": n, "parameter": p, **found} for (g, n, p), found in sorted(ours.items())]
+    results = {"conditions": {**before, "load_average_after": os.getloadavg()}, "peak_macs_per_second": peaks,
+               "ratios": ratios(figures), "figures": figures, "engine": engine}
+    path = Path(arguments.json)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(results, indent=1) + "\n")
+    print(f"written to {path}", file=sys.stderr)
 
 
-def report(figures):
-    print(f"{'shape':14}{'threads':>8} {'what':28}{'ms':>9}{'Mtexel/s':>10}{'GMAC/s':>9}{'ntmu is':>9}  codes that differ")
-    for shape in dict.fromkeys(f["shape"] for f in figures):
-        for threads in dict.fromkeys(f["threads"] for f in figures):
-            of = [f for f in figures if (f["shape"], f["threads"]) == (shape, threads)]
-            of.sort(key=lambda f: f["seconds"])
-            ours = min((f["seconds"] for f in of if f["what"].startswith("ntmu")), default=float("nan"))
-            for f in of:
-                rate = f["batch"] / f["seconds"]
-                agreement = f["agreement"]
-                differ = f"{agreement['differ']:.5%}, largest {agreement['largest']}" if agreement else ""
-                print(f"{shape:14}{threads:8} {f['what']:28}{f['seconds'] * 1e3:9.3f}{rate / 1e6:10.2f}"
-                      f"{rate * f['macs'] / 1e9:9.1f}{f['seconds'] / ours:8.2f}x  {differ}")
-            print()
+def cases(figures):
+    """The figures of each network and number of threads."""
+    keys = dict.fromkeys((f["shape"], f["threads"]) for f in figures)
+    for key in sorted(keys):
+        yield key, [f for f in figures if (f["shape"], f["threads"]) == key]
+
+
+def ratios(figures):
+    """How many times as long the fastest form of each other engine takes, by our order of inputs."""
+    found = []
+    for (shape, threads), of in cases(figures):
+        ours = {f["what"].split()[1]: f["seconds"] for f in of if f["what"].startswith("ntmu")}
+        for rival in ("onnxruntime", "torch", NO_BIAS):
+            theirs = [f for f in of if f["what"].startswith(rival) and (rival == NO_BIAS or f["what"] != NO_BIAS)]
+            if theirs:
+                best = min(theirs, key=lambda f: f["seconds"])
+                times = {order: best["seconds"] / seconds for order, seconds in ours.items()}
+                found.append({"shape": shape, "threads": threads, "against": best["what"], **times})
+    return found
+
+
+def report(figures, peak):
+    print(f"{'shape':20}{'threads':>8} {'what':28}{'ms':>9}{'Mtexel/s':>10}{'GMAC/s':>9}{'of peak':>9}  codes that differ")
+    for (shape, threads), of in cases(figures):
+        for f in sorted(of, key=lambda f: f["seconds"]):
+            rate = f["batch"] / f["seconds"]
+            macs = rate * f["macs"]
+            share = f"{macs / (peak * threads):8.1%}" if peak and f["what"].startswith("ntmu") else ""
+            agreement = f["agreement"]
+            differ = f"{agreement['differ']:.5%}, largest {agreement['largest']}" if agreement else ""
+            print(f"{shape:20}{threads:8} {f['what']:28}{f['seconds'] * 1e3:9.3f}{rate / 1e6:10.2f}"
+                  f"{macs / 1e9:9.1f}{share:>9}  {differ}")
+        print()
+    print(f"{'times as long as ntmu':28}{'threads':>8} {'against':28}{'row-major':>11}{'blocked':>9}")
+    for r in ratios(figures):
+        print(f"{r['shape']:28}{r['threads']:8} {r['against']:28}{r['row-major']:10.2f}x{r['blocked']:8.2f}x")
 
 
 if __name__ == "__main__":

@@ -28,13 +28,48 @@ pub struct Planar {
     pub channels: usize,
 }
 
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for i8 {}
+    impl Sealed for i16 {}
+}
+
+/// What an input of the synthesizer may come as: `i8` or `i16`.
+pub trait Input: sealed::Sealed + Copy + Sync {
+    /// The number.
+    fn value(self) -> i32;
+
+    /// The same numbers, if they are bytes.
+    fn as_bytes(inputs: &[Self]) -> Option<&[i8]>;
+}
+
+impl Input for i8 {
+    fn value(self) -> i32 {
+        i32::from(self)
+    }
+
+    fn as_bytes(inputs: &[i8]) -> Option<&[i8]> {
+        Some(inputs)
+    }
+}
+
+impl Input for i16 {
+    fn value(self) -> i32 {
+        i32::from(self)
+    }
+
+    fn as_bytes(_: &[i16]) -> Option<&[i8]> {
+        None
+    }
+}
+
 impl Engine<'_> {
     /// Writes the channel codes, \[texel\]\[channel\], of synthesizer inputs, \[texel\]\[input\],
     /// which are within the shape's input bits.
     ///
     /// # Panics
     /// When the inputs are no whole number of texels, or the codes not those of as many.
-    pub fn synthesize<I: Copy + Into<i32> + Sync>(&self, inputs: &[I], codes: &mut [i32]) {
+    pub fn synthesize<I: Input>(&self, inputs: &[I], codes: &mut [i32]) {
         let count = self.asset.shape.input_count() as usize;
         let channels = self.asset.shape.outputs.len();
         assert_eq!(inputs.len() % count, 0, "inputs of whole texels");
@@ -45,7 +80,7 @@ impl Engine<'_> {
             .for_each(|(inputs, codes)| self.chunk(inputs, codes));
     }
 
-    fn chunk<I: Copy + Into<i32>>(&self, inputs: &[I], codes: &mut [i32]) {
+    fn chunk<I: Input>(&self, inputs: &[I], codes: &mut [i32]) {
         let count = self.asset.shape.input_count() as usize;
         let channels = self.asset.shape.outputs.len();
         let mut scratch = TileScratch::new(self);
@@ -63,11 +98,14 @@ impl Engine<'_> {
     }
 
     /// The inputs of up to a tile of texels.
-    fn bring<I: Copy + Into<i32>>(&self, inputs: &[I], register: &mut Register) {
+    fn bring<I: Input>(&self, inputs: &[I], register: &mut Register) {
         let count = self.asset.shape.input_count() as usize;
-        match &self.inputs {
-            Inputs::Bytes(_) => bring::<u8, I>(inputs, count, &mut register.quads),
-            Inputs::Words(_) => bring::<i16, I>(inputs, count, &mut register.pairs),
+        match (&self.inputs, I::as_bytes(inputs)) {
+            (Inputs::Bytes(_), Some(bytes)) => {
+                self.kernels.bring(bytes, count, &mut register.quads)
+            }
+            (Inputs::Bytes(_), None) => bring::<u8, I>(inputs, count, &mut register.quads),
+            (Inputs::Words(_), _) => bring::<i16, I>(inputs, count, &mut register.pairs),
         }
     }
 
@@ -76,7 +114,7 @@ impl Engine<'_> {
     /// # Panics
     /// When the inputs are no whole number of texels.
     #[must_use]
-    pub fn block_inputs<I: Copy + Into<i32>>(&self, inputs: &[I]) -> Blocked {
+    pub fn block_inputs<I: Input>(&self, inputs: &[I]) -> Blocked {
         let count = self.asset.shape.input_count() as usize;
         assert_eq!(inputs.len() % count, 0, "inputs of whole texels");
         let tiles = inputs.chunks(TILE * count).map(|inputs| {
@@ -143,12 +181,12 @@ impl Planar {
 }
 
 /// Writes the inputs of texels in order, as lanes of a tile.
-fn bring<L: Lane, I: Copy + Into<i32>>(inputs: &[I], count: usize, groups: &mut [L::Group]) {
+fn bring<L: Lane, I: Input>(inputs: &[I], count: usize, groups: &mut [L::Group]) {
     let mut lanes = [L::ZERO; MAX_LANES as usize];
     let lanes = &mut lanes[..count];
     for (texel, inputs) in inputs.chunks_exact(count).enumerate() {
         for (lane, &input) in lanes.iter_mut().zip(inputs) {
-            *lane = L::of(input.into());
+            *lane = L::of(input.value());
         }
         L::put(groups, texel, lanes);
     }

@@ -106,6 +106,11 @@ impl Engine<'_> {
             }
             self.tile(&mut scratch);
             for (mut plane, sums) in codes.outer_iter_mut().zip(scratch.codes()) {
+                // Whole rows of a plane lie behind each other, as their texels do in a tile.
+                if let Some(plane) = plane.as_slice_mut() {
+                    plane[first..first + count].copy_from_slice(&sums.0[..count]);
+                    continue;
+                }
                 for (row, column, at, length) in pieces(first, count, columns) {
                     let mut to = plane.slice_mut(s![row, column..column + length]);
                     match to.as_slice_mut() {

@@ -24,7 +24,7 @@ mod register;
 mod texel;
 mod tile;
 
-pub use batch::{Blocked, Planar};
+pub use batch::{Blocked, Input, Planar};
 pub use path::Path;
 pub use texel::Scratch;
 

@@ -2,8 +2,8 @@
 //! instruction for bytes saturates its sums and would not be exact.
 
 use super::body::{each_row, kernels};
-use super::body_half::half_kernels;
-use super::body_rows::row_kernels;
+use super::body_half::{half_kernels, round_kernel};
+use super::body_rows::{bring_kernel, row_kernels};
 use std::arch::x86_64::*;
 
 const LANES: usize = 8;
@@ -202,4 +202,6 @@ primitives! {
 
 kernels!(#[target_feature(enable = "avx2,fma")]);
 row_kernels!(#[target_feature(enable = "avx2,fma")]);
+bring_kernel!(#[target_feature(enable = "avx2,fma")]);
 half_kernels!(#[target_feature(enable = "avx2,fma")]);
+round_kernel!(#[target_feature(enable = "avx2,fma")]);

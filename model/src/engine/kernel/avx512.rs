@@ -3,6 +3,7 @@
 use super::body::{each_row, kernels};
 use super::body_half::half_kernels;
 use super::body_rows::row_kernels;
+use super::half::LARGEST_HALF;
 use std::arch::x86_64::*;
 
 const LANES: usize = 16;
@@ -160,6 +161,17 @@ primitives! {
         unsafe { _mm512_storeu_si512(texels.as_mut_ptr().cast(), pairs) }
     }
 
+    /// Limited to ±65504 first, because the conversion gives infinities beyond; between that and the
+    /// first number that would become one it gives 65504 anyway. It keeps subnormals and the sign of
+    /// a zero.
+    fn round_lanes(lanes: &mut [f32; LANES]) {
+        let largest = splat_f32(LARGEST_HALF);
+        let smallest = splat_f32(-LARGEST_HALF);
+        let limited = _mm512_max_ps(_mm512_min_ps(load_f32(lanes), largest), smallest);
+        let half = _mm512_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(limited);
+        store_f32(_mm512_cvtph_ps(half), lanes);
+    }
+
     fn splat_f32(value: f32) -> F { _mm512_set1_ps(value) }
     fn multiply_f32(a: F, b: F) -> F { _mm512_mul_ps(a, b) }
     fn add_f32(a: F, b: F) -> F { _mm512_add_ps(a, b) }
@@ -179,3 +191,62 @@ primitives! {
 kernels!(#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]);
 row_kernels!(#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]);
 half_kernels!(#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]);
+
+/// Texel after texel becomes lane after lane: sixteen texels by sixteen quads at a time, transposed in
+/// registers.
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+pub(super) fn bring(inputs: &[i8], count: usize, output: &mut [Quad]) {
+    const SIDE: usize = 16;
+    for (first, texels) in (0..TILE).step_by(SIDE).zip(inputs.chunks(SIDE * count)) {
+        for from in (0..count).step_by(4 * SIDE) {
+            let length = (count - from).min(4 * SIDE);
+            let mask = u64::MAX >> (4 * SIDE - length);
+            let mut rows = [splat(0); SIDE];
+            for (row, texel) in rows.iter_mut().zip(texels.chunks_exact(count)) {
+                let bytes: &[i8] = &texel[from..from + length];
+                // SAFETY: the mask has `length` bits; bytes without one are not read.
+                let bytes = unsafe { _mm512_maskz_loadu_epi8(mask, bytes.as_ptr()) };
+                *row = _mm512_xor_si512(bytes, _mm512_set1_epi8(i8::MIN));
+            }
+            let quads = &mut output[from / 4..(from + length).div_ceil(4)];
+            for (quad, column) in quads.iter_mut().zip(transposed(rows)) {
+                let texels: &mut [[[u8; 4]; SIDE]] = quad.0.as_chunks_mut().0;
+                // SAFETY: the reference is to 64 writable bytes; the store needs no alignment.
+                unsafe { _mm512_storeu_si512(texels[first / SIDE].as_mut_ptr().cast(), column) }
+            }
+        }
+    }
+}
+
+/// Rows become columns, of 32 bits: by halves of 64 bits, of 128 bits, and then among the four 128-bit
+/// parts of a register.
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+#[inline]
+fn transposed(rows: [V; 16]) -> [V; 16] {
+    let mut pairs = rows;
+    for i in 0..8 {
+        pairs[2 * i] = _mm512_unpacklo_epi32(rows[2 * i], rows[2 * i + 1]);
+        pairs[2 * i + 1] = _mm512_unpackhi_epi32(rows[2 * i], rows[2 * i + 1]);
+    }
+    // Register 4·g + c: columns c, 4 + c, 8 + c, 12 + c of rows 4·g to 4·g + 3.
+    let mut fours = rows;
+    for g in 0..4 {
+        for half in 0..2 {
+            let (low, high) = (pairs[4 * g + half], pairs[4 * g + 2 + half]);
+            fours[4 * g + 2 * half] = _mm512_unpacklo_epi64(low, high);
+            fours[4 * g + 2 * half + 1] = _mm512_unpackhi_epi64(low, high);
+        }
+    }
+    let mut columns = rows;
+    for c in 0..4 {
+        let a = _mm512_shuffle_i32x4::<0x88>(fours[c], fours[4 + c]);
+        let b = _mm512_shuffle_i32x4::<0xdd>(fours[c], fours[4 + c]);
+        let d = _mm512_shuffle_i32x4::<0x88>(fours[8 + c], fours[12 + c]);
+        let e = _mm512_shuffle_i32x4::<0xdd>(fours[8 + c], fours[12 + c]);
+        columns[c] = _mm512_shuffle_i32x4::<0x88>(a, d);
+        columns[4 + c] = _mm512_shuffle_i32x4::<0x88>(b, e);
+        columns[8 + c] = _mm512_shuffle_i32x4::<0xdd>(a, d);
+        columns[12 + c] = _mm512_shuffle_i32x4::<0xdd>(b, e);
+    }
+    columns
+}

@@ -27,7 +27,7 @@ macro_rules! kernels {
             TILE,
         };
         use crate::engine::kernel::weights::{Dense16, Dense8, DenseHalf, HalfOrder};
-        use crate::engine::kernel::half::{HalfStep, HalfToInteger, round_to_half};
+        use crate::engine::kernel::half::{HalfStep, HalfToInteger};
 
         const IDENTITY: u8 = 0;
         const RELU: u8 = 1;

@@ -102,7 +102,9 @@ macro_rules! half_kernels {
                     row.0.iter_mut().zip(&source[lane].0).for_each(|(x, from)| *x += from);
                 }
                 if is_rounded {
-                    row.0.iter_mut().for_each(|x| *x = round_to_half(*x));
+                    for lanes in row.0.as_chunks_mut::<LANES>().0 {
+                        round_lanes(lanes);
+                    }
                 }
             }
         }
@@ -128,11 +130,30 @@ macro_rules! half_kernels {
             for (lane, halves) in output.iter_mut().enumerate() {
                 input.lane(lane, &mut values);
                 for (half, &value) in halves.0.iter_mut().zip(&values) {
-                    *half = round_to_half((value - zero) as f32 * factor);
+                    *half = (value - zero) as f32 * factor;
+                }
+                // Less its zero a byte has nine bits, which fp16 holds exactly.
+                if let Integers::Pairs(_) = input {
+                    for lanes in halves.0.as_chunks_mut::<LANES>().0 {
+                        round_lanes(lanes);
+                    }
                 }
             }
         }
     };
 }
 
-pub(super) use half_kernels;
+/// Rounding to fp16, for sets without an instruction for it.
+macro_rules! round_kernel {
+    ($(#[$feature:meta])*) => {
+        $(#[$feature])*
+        #[inline]
+        fn round_lanes(lanes: &mut [f32; LANES]) {
+            for lane in lanes {
+                *lane = crate::engine::kernel::half::round_to_half(*lane);
+            }
+        }
+    };
+}
+
+pub(super) use {half_kernels, round_kernel};

@@ -68,4 +68,24 @@ macro_rules! row_kernels {
     };
 }
 
-pub(super) use row_kernels;
+/// Texel after texel becomes lane after lane, for sets that have no better way.
+macro_rules! bring_kernel {
+    ($(#[$feature:meta])*) => {
+        $(#[$feature])*
+        pub(super) fn bring(inputs: &[i8], count: usize, output: &mut [Quad]) {
+            for (texel, row) in inputs.chunks_exact(count).take(TILE).enumerate() {
+                let (whole, rest) = row.as_chunks::<4>();
+                for (quad, lanes) in output.iter_mut().zip(whole) {
+                    quad.0[texel] = lanes.map(|lane| lane as u8 ^ 0x80);
+                }
+                if !rest.is_empty() {
+                    for (to, &lane) in output[whole.len()].0[texel].iter_mut().zip(rest) {
+                        *to = lane as u8 ^ 0x80;
+                    }
+                }
+            }
+        }
+    };
+}
+
+pub(super) use {bring_kernel, row_kernels};

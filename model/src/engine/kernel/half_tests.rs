@@ -298,3 +298,35 @@ fn every_set_reads_every_integer_as_the_specified_half() {
         }
     }
 }
+
+#[test]
+fn every_set_rounds_every_neighbourhood_of_a_half_like_the_integers() {
+    let every = if cfg!(miri) { 2039 } else { 1 };
+    let all: Vec<f32> = halves()
+        .step_by(every)
+        .chain([65_520.0, 1e9, f32::MAX])
+        .collect();
+    let mut near: Vec<f32> = all
+        .windows(2)
+        .flat_map(|pair| {
+            let middle = (pair[0] / 2.0 + pair[1] / 2.0).to_bits();
+            [
+                pair[0].to_bits(),
+                middle - middle.min(1),
+                middle,
+                middle + 1,
+            ]
+            .map(f32::from_bits)
+        })
+        .flat_map(|x| [x, -x])
+        .collect();
+    near.resize(near.len().next_multiple_of(TILE), 0.0);
+    for kernels in Path::available().into_iter().filter_map(Kernels::new) {
+        for tile in near.as_chunks::<TILE>().0 {
+            let mut found = [Halves(*tile)];
+            kernels.half_finish(HalfStep::Identity, None, true, &mut found);
+            let expected = tile.map(|x| round_by_integers(x).to_bits());
+            assert_eq!(found[0].0.map(f32::to_bits), expected, "{kernels:?}");
+        }
+    }
+}

@@ -181,6 +181,15 @@ impl Kernels {
         dispatch!(self.set, pack_pairs(rows, (low, high), output));
     }
 
+    /// Signed bytes, \[texel\]\[input\], of up to a tile of texels with `count` inputs each, as lanes.
+    ///
+    /// # Panics
+    /// When they are more than a tile, or the output has fewer quads than the inputs fill.
+    pub fn bring(self, inputs: &[i8], count: usize, output: &mut [Quad]) {
+        assert!(inputs.len() <= TILE * count, "a tile");
+        dispatch!(self.set, bring(inputs, count, output));
+    }
+
     /// The sums of one fp16 layer, in `f32`.
     ///
     /// # Panics

@@ -1,8 +1,8 @@
 //! NEON: four lanes. Bytes are multiplied as signed ones, widened to 16 bits, and added in pairs.
 
 use super::body::{each_row, kernels};
-use super::body_half::half_kernels;
-use super::body_rows::row_kernels;
+use super::body_half::{half_kernels, round_kernel};
+use super::body_rows::{bring_kernel, row_kernels};
 use std::arch::aarch64::*;
 
 const LANES: usize = 4;
@@ -178,4 +178,6 @@ primitives! {
 
 kernels!(#[target_feature(enable = "neon")]);
 row_kernels!(#[target_feature(enable = "neon")]);
+bring_kernel!(#[target_feature(enable = "neon")]);
 half_kernels!(#[target_feature(enable = "neon")]);
+round_kernel!(#[target_feature(enable = "neon")]);

@@ -1,8 +1,8 @@
 //! Scalar: plain Rust, eight lanes that a compiler may put into whatever registers it has.
 
 use super::body::{each_row, kernels};
-use super::body_half::half_kernels;
-use super::body_rows::row_kernels;
+use super::body_half::{half_kernels, round_kernel};
+use super::body_rows::{bring_kernel, row_kernels};
 
 const LANES: usize = 8;
 const VECTORS: usize = 1;
@@ -176,4 +176,6 @@ fn store_f32(value: F, lanes: &mut [f32; LANES]) {
 
 kernels!();
 row_kernels!();
+bring_kernel!();
 half_kernels!();
+round_kernel!();

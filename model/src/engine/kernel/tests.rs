@@ -387,6 +387,29 @@ fn interpolation_equals_its_definition() {
 }
 
 #[test]
+fn every_set_brings_texels_of_any_width_into_lanes() {
+    let mut random = Random(11);
+    for count in [1, 3, 4, 5, 61, 63, 64, 65, 127, 130] {
+        for texels in [1, 15, 16, 17, 63, TILE] {
+            let inputs: Vec<i8> = (0..texels * count).map(|_| random.byte()).collect();
+            for kernels in every_set() {
+                let mut quads = vec![Quad::ZERO; count.div_ceil(4)];
+                kernels.bring(&inputs, count, &mut quads);
+                for (at, &input) in inputs.iter().enumerate() {
+                    let (texel, lane) = (at / count, at % count);
+                    let found = Integers::Quads(&quads).value(lane, texel);
+                    assert_eq!(
+                        found,
+                        i32::from(input),
+                        "{kernels:?} {count} {texel} {lane}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn a_fold_is_refused_where_it_would_not_be_exact() {
     let scale = Multiplier::power_of_two(0);
     assert!(Scale::fold(scale, 0, 0, 1 << 20).is_some());

@@ -75,9 +75,10 @@ impl Integers<'_> {
     pub(super) fn lane(self, lane: usize, values: &mut [i32; TILE]) {
         match self {
             Integers::Quads(quads) => {
-                let (quad, byte) = (&quads[lane / 4].0, lane % 4);
-                for (value, texel) in values.iter_mut().zip(quad) {
-                    *value = i32::from(texel[byte]) - 128;
+                // A shift of the whole quad is what vector instructions have.
+                let (quad, bits) = (&quads[lane / 4].0, 8 * (lane % 4) as u32);
+                for (value, &texel) in values.iter_mut().zip(quad) {
+                    *value = (u32::from_le_bytes(texel) >> bits & 0xff) as i32 - 128;
                 }
             }
             Integers::Pairs(pairs) => {
