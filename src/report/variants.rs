@@ -7,14 +7,16 @@ use maud::{Markup, html};
 /// The section; nothing where no variant was tried.
 pub(super) fn section(study: &Study) -> Markup {
     html! {
-        @if !study.variants.is_empty() {
+        @if !study.variants.tried.is_empty() {
             section #variants {
                 h2 { "Other numbers, other profiles" }
                 p {
                     "The same training, rounded to other widths or decoded by the choices of other \
                      implementations, against the codes of the asset as it is ("
-                    (study.asset.precision) ", profile " code { (study.asset.profile) } "). A row of "
-                    "zeros is a choice that this asset never meets."
+                    (study.asset.precision) ", profile " code { (study.asset.profile) } "), at "
+                    (integer(study.variants.texels as u64)) " texels of all mips"
+                    @if let Some(own) = study.variants.psnr { ", where it has " (psnr(own)) " dB" }
+                    ". A row of zeros is a choice that this asset never meets."
                 }
                 table {
                     thead {
@@ -26,7 +28,7 @@ pub(super) fn section(study: &Study) -> Markup {
                             th.number scope="col" { "PSNR, dB" }
                         }
                     }
-                    tbody { @for variant in &study.variants { (row(variant)) } }
+                    tbody { @for variant in &study.variants.tried { (row(variant)) } }
                 }
             }
         }

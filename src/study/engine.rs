@@ -1,6 +1,6 @@
 //! The engine, which decodes what a study measures, against the reference.
 
-use super::claims::sample;
+use super::claims::{CLAIM_TEXELS, sample};
 use ntmu_isa::layout::Layout;
 use ntmu_isa::{Asset, Program};
 use ntmu_model::engine::Engine;
@@ -34,7 +34,7 @@ pub fn compare_with_reference(asset: &Asset) -> EngineStudy {
     let engine = Engine::new(asset);
     let mut scratch = engine.scratch();
     let mut codes = vec![0; asset.shape.outputs.len()];
-    let requests = sample(asset);
+    let requests = sample(asset, CLAIM_TEXELS);
     let differing = requests.iter().filter(|&&request| {
         engine.texel(&mut scratch, request, &mut codes);
         codes != decoder.texel(request, &mut ())

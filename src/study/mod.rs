@@ -20,7 +20,7 @@ pub use oracle::{OracleStudy, compare_with_oracle};
 pub use sweep::{SweepPoint, SweepStudyError, sweep, sweep_points};
 pub use timing::{Charge, TimingRow, simulate, timing_points};
 pub use twin::{TwinStudy, compare_with_twin};
-pub use variants::{Variant, VariantError, VariantOutcome, variant_count, variants};
+pub use variants::{Variant, VariantOutcome, Variants, variant_count, variants};
 pub use vectors::vectors;
 
 use crate::precision;
@@ -101,7 +101,7 @@ pub struct Study {
     /// Between mips, per level of detail and way to decode; empty without a source.
     pub in_between: Vec<InBetween>,
     /// The asset in other numbers and under other profiles.
-    pub variants: Vec<Variant>,
+    pub variants: Variants,
 }
 
 impl Study {

@@ -1,13 +1,32 @@
 //! Variants: the same asset in other numbers, and under other profiles.
 
-use crate::decoded::Decoded;
-use crate::metrics::{self, MetricsError};
+use super::claims::sample;
+use crate::decoded::real;
 use crate::precision::{self, PrecisionError};
 use crate::quality;
 use ndarray::Array3;
 use ntmu_isa::Asset;
 use ntmu_isa::profile::{NamedProfile, ProfileError};
+use ntmu_model::Request;
+use ntmu_model::engine::Engine;
+use ntmu_model::sampler::Decode as _;
+use rayon::prelude::*;
 use serde::Serialize;
+
+/// Texels that are decoded of every variant: an fp16 layer that sums in fp16 takes a millisecond for
+/// one.
+const VARIANT_TEXELS: usize = 1 << 15;
+
+/// What was tried, at a sample of texels of all mips.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Variants {
+    /// Texels of the sample.
+    pub texels: usize,
+    /// PSNR of the asset as it is, at these texels; where there is a source.
+    pub psnr: Option<f64>,
+    /// Each variant.
+    pub tried: Vec<Variant>,
+}
 
 /// One variant and what became of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -30,7 +49,7 @@ pub enum VariantOutcome {
         codes: u64,
         /// The largest difference, in codes.
         largest: u32,
-        /// PSNR over all maps and mips against the source, in dB; where there is a source.
+        /// PSNR over all channels of the sample against the source, in dB; where there is a source.
         psnr: Option<f64>,
         /// Bits per pixel and channel, parameters counted.
         bppc: f64,
@@ -40,17 +59,6 @@ pub enum VariantOutcome {
         /// Why.
         reason: String,
     },
-}
-
-/// Why the variants could not be tried.
-#[derive(Debug, thiserror::Error)]
-pub enum VariantError {
-    /// A built-in profile cannot be read.
-    #[error(transparent)]
-    Profile(#[from] ProfileError),
-    /// A variant cannot be compared with the source.
-    #[error(transparent)]
-    Metrics(#[from] MetricsError),
 }
 
 /// Widths of activations that are tried, where they are not the asset's own.
@@ -98,59 +106,74 @@ pub fn variant_count(asset: &Asset) -> Result<u64, ProfileError> {
     Ok(candidates(asset)?.len() as u64)
 }
 
-/// Decodes every variant and compares its codes with the asset's own, and with the source where
-/// there is one. `after_variant` is called with the variants done.
+/// Decodes a sample of texels of every variant and compares the codes with the asset's own, and with
+/// the source where there is one. `after_variant` is called with the variants done.
 ///
 /// # Errors
-/// When the source does not have the asset's shape.
+/// When a built-in profile cannot be read.
 pub fn variants(
     asset: &Asset,
-    decoded: &Decoded,
     reference: Option<&[Array3<f32>]>,
     mut after_variant: impl FnMut(u64),
-) -> Result<Vec<Variant>, VariantError> {
+) -> Result<Variants, ProfileError> {
+    let requests = sample(asset, VARIANT_TEXELS);
+    let own = decode(asset, &requests);
+    let psnr_of =
+        |codes: &[Vec<i32>]| reference.map(|reference| psnr(codes, &requests, asset, reference));
     let mut tried = Vec::new();
     for (name, candidate) in candidates(asset)? {
         let outcome = match candidate {
             Err(error) => VariantOutcome::Impossible {
                 reason: error.to_string(),
             },
-            Ok(variant) => compare(&variant, decoded, reference)?,
+            Ok(variant) => {
+                let codes = decode(&variant, &requests);
+                let pairs = own.iter().flatten().zip(codes.iter().flatten());
+                let differences = || pairs.clone().map(|(a, b)| a.abs_diff(*b));
+                VariantOutcome::Decoded {
+                    differing: differences().filter(|&d| d != 0).count() as u64,
+                    codes: differences().count() as u64,
+                    largest: differences().max().unwrap_or(0),
+                    psnr: psnr_of(&codes),
+                    bppc: quality::bppc(&variant),
+                }
+            }
         };
         tried.push(Variant { name, outcome });
         after_variant(tried.len() as u64);
     }
-    Ok(tried)
+    Ok(Variants {
+        texels: requests.len(),
+        psnr: psnr_of(&own),
+        tried,
+    })
 }
 
-fn compare(
-    variant: &Asset,
-    decoded: &Decoded,
-    reference: Option<&[Array3<f32>]>,
-) -> Result<VariantOutcome, MetricsError> {
-    let other = Decoded::of(variant, |_| ());
-    let pairs = decoded.mips.iter().zip(&other.mips);
-    let differences = pairs.flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)));
-    let (mut codes, mut differing, mut largest) = (0, 0, 0);
-    for difference in differences {
-        codes += 1;
-        differing += u64::from(difference != 0);
-        largest = largest.max(difference);
-    }
-    let psnr = match reference {
-        None => None,
-        Some(reference) => {
-            let channels: Vec<usize> = (0..variant.shape.outputs.len()).collect();
-            let mips: Vec<usize> = (0..reference.len()).collect();
-            let reals = other.reals(&variant.shape);
-            Some(metrics::psnr(reference, &reals, &channels, &mips)?)
-        }
-    };
-    Ok(VariantOutcome::Decoded {
-        differing,
-        codes,
-        largest,
-        psnr,
-        bppc: quality::bppc(variant),
-    })
+/// Texels that one thread decodes at a time.
+const CHUNK: usize = 1024;
+
+fn decode(asset: &Asset, requests: &[Request]) -> Vec<Vec<i32>> {
+    let engine = Engine::new(asset);
+    let chunks = requests.par_chunks(CHUNK);
+    chunks
+        .flat_map_iter(|requests| engine.texels(requests))
+        .collect()
+}
+
+/// In dB, over all channels of the texels.
+fn psnr(codes: &[Vec<i32>], requests: &[Request], asset: &Asset, reference: &[Array3<f32>]) -> f64 {
+    let formats = &asset.shape.outputs;
+    let squares = requests.iter().zip(codes).flat_map(|(request, codes)| {
+        let source = &reference[usize::from(request.mip())];
+        let place = [request.y() as usize, request.x() as usize];
+        let channels = codes.iter().zip(formats).enumerate();
+        channels.map(move |(channel, (&code, &format))| {
+            let source = f64::from(source[[channel, place[0], place[1]]]);
+            (f64::from(real(code, format)) - source).powi(2)
+        })
+    });
+    let (sum, count) = squares.fold((0.0, 0_u64), |(sum, count), square| {
+        (sum + square, count + 1)
+    });
+    -10.0 * (sum / count as f64).log10()
 }

@@ -132,7 +132,7 @@ fn study(asset: &Asset, reference: Option<&[Array3<f32>]>) -> anyhow::Result<(Re
     bar.finish_and_clear();
 
     let bar = console::progress(study::variant_count(asset)?, "variants");
-    let variants = study::variants(asset, &decoded, reference, |done| bar.set_position(done))?;
+    let variants = study::variants(asset, reference, |done| bar.set_position(done))?;
     bar.finish_and_clear();
     let asset = AssetStudy::of(asset);
     Ok((

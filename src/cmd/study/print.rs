@@ -1,7 +1,7 @@
 //! What a study found, as tables on stdout.
 
 use crate::console;
-use ntmu::study::{Findings, InBetween, Study as Results, TwinStudy, Variant, VariantOutcome};
+use ntmu::study::{Findings, InBetween, Study as Results, TwinStudy, VariantOutcome, Variants};
 
 pub(super) fn results(results: &Results) {
     let asset = &results.asset;
@@ -90,14 +90,14 @@ fn print_in_between(points: &[InBetween]) {
     console::print(&table.to_string());
 }
 
-fn print_variants(variants: &[Variant]) {
+fn print_variants(variants: &Variants) {
     let mut table = console::table(&[
         "instead of the asset's own",
         "codes that differ",
         "at most",
         "PSNR, dB",
     ]);
-    for variant in variants {
+    for variant in &variants.tried {
         let name = variant.name.clone();
         match &variant.outcome {
             VariantOutcome::Decoded {
@@ -117,7 +117,12 @@ fn print_variants(variants: &[Variant]) {
             }
         };
     }
-    console::print("the same training in other numbers and under other profiles:");
+    let own = variants.psnr;
+    console::print(&format!(
+        "the same training in other numbers and under other profiles, at {} texels{}:",
+        variants.texels,
+        own.map_or(String::new(), |psnr| format!(" with {psnr:.2} dB as it is"))
+    ));
     console::print(&table.to_string());
 }
 

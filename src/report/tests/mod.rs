@@ -7,7 +7,7 @@ use super::MapPicture;
 use crate::quality::{Figures, MapQuality, Quality};
 use crate::study::{
     AssetStudy, Charge, EngineStudy, Findings, InBetween, OracleStudy, Study, SweepPoint,
-    TimingRow, TwinStudy, Variant, VariantOutcome,
+    TimingRow, TwinStudy, Variant, VariantOutcome, Variants,
 };
 use ndarray::Array3;
 use ntmu_conformance::claims::{Channel, Distance};
@@ -137,24 +137,28 @@ fn study() -> Study {
             psnr: 30.5,
             decodes: 8.0,
         }],
-        variants: vec![
-            Variant {
-                name: "<gemmlowp>".to_owned(),
-                outcome: VariantOutcome::Decoded {
-                    differing: 6021,
-                    codes: 786_429,
-                    largest: 3,
-                    psnr: Some(31.09),
-                    bppc: 0.577,
+        variants: Variants {
+            texels: 32_768,
+            psnr: Some(31.12),
+            tried: vec![
+                Variant {
+                    name: "<gemmlowp>".to_owned(),
+                    outcome: VariantOutcome::Decoded {
+                        differing: 6021,
+                        codes: 786_429,
+                        largest: 3,
+                        psnr: Some(31.09),
+                        bppc: 0.577,
+                    },
                 },
-            },
-            Variant {
-                name: "fp16 layers".to_owned(),
-                outcome: VariantOutcome::Impossible {
-                    reason: "layer 2: found a table".to_owned(),
+                Variant {
+                    name: "fp16 layers".to_owned(),
+                    outcome: VariantOutcome::Impossible {
+                        reason: "layer 2: found a table".to_owned(),
+                    },
                 },
-            },
-        ],
+            ],
+        },
     }
 }
 
