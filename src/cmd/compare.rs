@@ -1,5 +1,6 @@
 //! `ntmu compare`: an asset against its source.
 
+use super::profile::ProfileChoice;
 use crate::Verdict;
 use crate::{console, files};
 use anyhow::Context as _;
@@ -20,6 +21,8 @@ pub(crate) struct Compare {
     /// Fail (exit code 1) when the overall PSNR is below this many dB.
     #[arg(long, value_name = "DB")]
     min_psnr: Option<f64>,
+    #[command(flatten)]
+    profile: ProfileChoice,
 }
 
 /// The source of an asset, with the channels that the asset has, in its order.
@@ -76,7 +79,7 @@ impl Compare {
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("ntx"));
         let (reference, test, maps, rate) = if is_asset {
-            let asset = files::read_asset(&self.test)?;
+            let asset = self.profile.apply(files::read_asset(&self.test)?)?;
             let reference = source_of(&asset, &set)?;
             let bar = console::progress(asset.shape.texel_count(), "decoding");
             let test = Decoded::of(&asset, |done| bar.set_position(done)).reals(&asset.shape);
@@ -85,7 +88,7 @@ impl Compare {
                 reference,
                 test,
                 quality::maps_of(&asset),
-                Some(quality::bppc(&asset)),
+                Some((quality::bppc(&asset), asset.profile.identity())),
             )
         } else {
             let test = TextureSet::read(&self.test)?;
@@ -99,12 +102,13 @@ impl Compare {
         let quality = Quality::measure(&reference, &test, &maps)
             .with_context(|| format!("{} and {}", self.reference.display(), self.test.display()))?;
         if json {
-            console::print_json(&json!({ "quality": quality, "bppc": rate }))?;
+            let (bppc, profile) = rate.unzip();
+            console::print_json(&json!({ "quality": quality, "bppc": bppc, "profile": profile }))?;
         } else {
             console::print(&table(&quality));
-            if let Some(rate) = rate {
+            if let Some((rate, profile)) = rate {
                 console::print(&format!(
-                    "{rate:.4} bits per pixel and channel, parameters counted"
+                    "{rate:.4} bits per pixel and channel, parameters counted; profile {profile}"
                 ));
             }
         }

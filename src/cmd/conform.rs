@@ -97,13 +97,14 @@ fn open(on: On) -> anyhow::Result<Box<dyn Device>> {
 const SHOWN_FAILURES: usize = 10;
 
 fn print(summary: &Summary) {
-    let mut table = console::table(&["suite", "passed", "failed", "not offered"]);
+    let mut table = console::table(&["suite", "passed", "failed", "not offered", "profiles"]);
     for suite in &summary.suites {
         table.add_row([
             suite.suite.clone(),
             suite.passed.to_string(),
             suite.failed.to_string(),
             suite.unsupported.to_string(),
+            suite.profiles.len().to_string(),
         ]);
     }
     console::print(&format!("device: {}", summary.device));

@@ -163,16 +163,17 @@ impl Encode {
     ) -> anyhow::Result<()> {
         let rate = quality::bppc(&trained.asset);
         let report = &trained.report;
+        let profile = trained.asset.profile.identity();
         if json {
             return console::print_json(&json!({
                 "output": self.output, "quality": quality, "bppc": rate, "training": report,
-                "seconds": elapsed.as_secs_f64(),
+                "seconds": elapsed.as_secs_f64(), "profile": profile,
             }));
         }
         console::print(&super::super::compare::table(quality));
         console::print(&format!(
             "{:.4} bits per pixel and channel, parameters counted; {} multiplications per texel\n\
-             float network {:.2} dB, deployed integers {:.2} dB\n\
+             profile {profile}; float network {:.2} dB, deployed {:.2} dB\n\
              {} in {:.0} s",
             rate,
             trained.asset.macs(),
