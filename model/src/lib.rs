@@ -6,6 +6,7 @@
 
 #![deny(unsafe_code)]
 
+pub mod demand;
 pub mod engine;
 pub mod exec;
 pub mod place;
@@ -14,5 +15,6 @@ pub mod sampler;
 pub mod time;
 pub mod trace;
 
+pub use demand::{Demand, Demands};
 pub use place::{Place, PlaceError};
 pub use request::{Request, RequestError};

@@ -2,6 +2,8 @@
 //!
 //! This is the only wire between [`exec`](crate::exec) and `time`; neither imports the other.
 
+use crate::place::Place;
+
 /// One `fetch` instruction of one texel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fetch {
@@ -9,8 +11,21 @@ pub struct Fetch {
     pub grid: u8,
     /// The address of the first byte of each corner's cell: (0,0), (1,0), (0,1), (1,1).
     pub addresses: [u64; 4],
-    /// Bytes of a cell.
+    /// Bytes of a cell, or of its part in one plane.
     pub cell_bytes: u32,
+    /// Planes that a cell lies in: 1 where its channels are stored together.
+    pub planes: u32,
+    /// From a cell's part in one plane to its part in the next, in bytes.
+    pub plane_bytes: u64,
+}
+
+/// Where a decode touches memory: what a run on values tells a run on cycles.
+pub trait Addresses {
+    /// Adds the fetches that the decode of a place makes, in the order of the program.
+    fn fetches(&self, place: &Place, fetches: &mut Vec<Fetch>);
+
+    /// Bytes from address 0 on that fetches can touch.
+    fn bytes(&self) -> u64;
 }
 
 /// The fetches of a run of texels, in request order.

@@ -22,5 +22,7 @@ pub(super) fn addresses(asset: &Asset, layout: Layout, grid: usize, corners: &Co
         grid: grid as u8,
         addresses,
         cell_bytes: Layout::cell_bytes(shape, grid) as u32,
+        planes: 1,
+        plane_bytes: 0,
     }
 }

@@ -189,6 +189,8 @@ pub(super) fn trace_of(
                 grid: index as u8,
                 addresses: cells.map(|(x, y)| layout.address(shape, index, x, y)),
                 cell_bytes: Layout::cell_bytes(shape, index) as u32,
+                planes: 1,
+                plane_bytes: 0,
             });
         }
         trace.end_texel();
@@ -256,6 +258,8 @@ pub(super) fn addresses(addresses: &[[u64; 4]]) -> Trace {
             grid: 0,
             addresses,
             cell_bytes: 1,
+            planes: 1,
+            plane_bytes: 0,
         });
         trace.end_texel();
     }

@@ -38,6 +38,9 @@ pub mod report;
 pub mod unit;
 pub mod work;
 
+pub mod choice;
+pub mod watch;
+
 mod cache;
 mod compute;
 mod cost;

@@ -14,6 +14,7 @@
 //! layer is a whole number of tiles, and every other stage so that it keeps up with the array on a
 //! synthesizer of about 10,000 multiplications per texel, the hardware-sized shapes.
 
+use super::choice::{CacheKind, Dataflow, Misses, Replacement, Wiring};
 use super::unit::{Configuration, Unit, UnitError};
 
 /// The names of the presets, smallest unit first.
@@ -25,6 +26,10 @@ const MOBILE: Configuration = Configuration {
     clock_mhz: 800,
     // A quad of pixels a cycle.
     requests_per_cycle: 4,
+    quad_pixels: 4,
+    decoded_cache_blocks: 0,
+    decoded_cache_ways: 4,
+    decoded_block_side: 4,
     // Four texel blocks: ATTILA's access queue.
     request_queue_texels: 64,
     // A quad, as in Skybox.
@@ -42,6 +47,10 @@ const MOBILE: Configuration = Configuration {
     hit_latency_cycles: 4,
     // Skybox.
     mshrs: 16,
+    level2_sets: 0,
+    level2_ways: 16,
+    level2_latency_cycles: 0,
+    level2_bytes_per_cycle: 64,
     // 188 ns: a system-level cache that misses to LPDDR.
     memory_latency_cycles: 150,
     // 6.4 GB/s: an eighth of a 51.2 GB/s LPDDR5 interface, for one of eight units.
@@ -58,17 +67,21 @@ const MOBILE: Configuration = Configuration {
     batch_texels: 16,
     // One: the requantisers' tail shows, the accumulators are half as many.
     batches_in_flight: 1,
+    material_bins: 1,
     // Holds every hidden width up to 64 with four blocks: 37,000 weights and their rows are 42 KiB.
     weight_sram_bytes: 48 * 1024,
     weight_fill_bytes_per_cycle: 16,
+    weight_latency_cycles: 0,
     // A row of weights a cycle: one tile in the time that a texel block passes.
     tile_load_cycles: 16,
+    tile_buffers: 2,
     // A 64-wide layer is four tiles by four.
     mac_rows: 16,
     mac_columns: 16,
     mac_arrays: 1,
     wide_passes: 2,
     half_passes: 2,
+    narrow_columns: 1,
     // Multiplier, four levels of adders, accumulator.
     mac_depth_cycles: 6,
     // One row of tiles a cycle: keeps up with a layer of a single column of tiles.
@@ -77,9 +90,16 @@ const MOBILE: Configuration = Configuration {
     requantizer_depth_cycles: 4,
     skip_lanes: 16,
     // Two jobs.
-    output_queue_texels: 32,
+    filter_lanes: 64,
+    filter_depth_cycles: 4,
+    output_queue_pixels: 32,
     // An RGBA texel a cycle, like a bilinear filter.
     output_channels_per_cycle: 4,
+    cache: CacheKind::Finite,
+    replacement: Replacement::Lru,
+    misses: Misses::HitUnderMiss,
+    dataflow: Dataflow::WeightStationary,
+    wiring: Wiring::Broadcast,
 };
 
 /// A middle unit: 1024 multiplications a cycle, 16 KiB of latents.
@@ -87,6 +107,10 @@ const CONSOLE: Configuration = Configuration {
     // A clock that console GPUs are run at.
     clock_mhz: 1_800,
     requests_per_cycle: 4,
+    quad_pixels: 4,
+    decoded_cache_blocks: 0,
+    decoded_cache_ways: 4,
+    decoded_block_side: 4,
     request_queue_texels: 128,
     coalesced_texels: 4,
     // A quad in two cycles.
@@ -100,6 +124,10 @@ const CONSOLE: Configuration = Configuration {
     lookups_per_bank: 1,
     hit_latency_cycles: 8,
     mshrs: 32,
+    level2_sets: 0,
+    level2_ways: 16,
+    level2_latency_cycles: 0,
+    level2_bytes_per_cycle: 64,
     // 139 ns: a level 2 that misses to GDDR.
     memory_latency_cycles: 250,
     // 57.6 GB/s: half of what a level 2 with 64 bytes per cycle gives one client.
@@ -114,26 +142,37 @@ const CONSOLE: Configuration = Configuration {
     batch_texels: 32,
     // Two: one is requantised while the other is multiplied.
     batches_in_flight: 2,
+    material_bins: 1,
     // Holds the 64-wide CNTC shape and its successor while one replaces the other; a 128-wide one
     // is streamed.
     weight_sram_bytes: 128 * 1024,
     weight_fill_bytes_per_cycle: 32,
+    weight_latency_cycles: 0,
     // A row of weights a cycle: one tile in the time of a batch.
     tile_load_cycles: 32,
+    tile_buffers: 2,
     // A 64-wide layer is two tiles by two.
     mac_rows: 32,
     mac_columns: 32,
     mac_arrays: 1,
     wide_passes: 2,
     half_passes: 2,
+    narrow_columns: 1,
     // One level of adders more than with 16 columns.
     mac_depth_cycles: 7,
     requantizer_lanes: 32,
     requantizer_depth_cycles: 4,
     skip_lanes: 32,
     // Two jobs.
-    output_queue_texels: 128,
+    filter_lanes: 64,
+    filter_depth_cycles: 4,
+    output_queue_pixels: 128,
     output_channels_per_cycle: 8,
+    cache: CacheKind::Finite,
+    replacement: Replacement::Lru,
+    misses: Misses::HitUnderMiss,
+    dataflow: Dataflow::WeightStationary,
+    wiring: Wiring::Broadcast,
 };
 
 /// A large unit: 4096 multiplications a cycle, 128 KiB of latents.
@@ -142,6 +181,10 @@ const DESKTOP: Configuration = Configuration {
     clock_mhz: 2_500,
     // Two quads a cycle.
     requests_per_cycle: 8,
+    quad_pixels: 4,
+    decoded_cache_blocks: 0,
+    decoded_cache_ways: 4,
+    decoded_block_side: 4,
     request_queue_texels: 256,
     coalesced_texels: 4,
     // A quad a cycle.
@@ -154,6 +197,10 @@ const DESKTOP: Configuration = Configuration {
     lookups_per_bank: 1,
     hit_latency_cycles: 20,
     mshrs: 64,
+    level2_sets: 0,
+    level2_ways: 16,
+    level2_latency_cycles: 0,
+    level2_bytes_per_cycle: 64,
     // 160 ns: a level 2 that misses to GDDR.
     memory_latency_cycles: 400,
     // 160 GB/s: a level 2 with 64 bytes per cycle for each client.
@@ -166,26 +213,37 @@ const DESKTOP: Configuration = Configuration {
     embed_lanes: 32,
     batch_texels: 64,
     batches_in_flight: 2,
+    material_bins: 1,
     // Holds the 128-wide CNTC shapes (158,000 weights and their rows).
     weight_sram_bytes: 256 * 1024,
     weight_fill_bytes_per_cycle: 64,
+    weight_latency_cycles: 0,
     // Two rows of weights a cycle: one tile in the 16 cycles in which 64 texels pass four arrays.
     tile_load_cycles: 16,
+    tile_buffers: 2,
     // A 64-wide layer is two tiles by two; four arrays share the texels.
     mac_rows: 32,
     mac_columns: 32,
     mac_arrays: 4,
     wide_passes: 2,
     half_passes: 2,
+    narrow_columns: 1,
     mac_depth_cycles: 7,
     // Four arrays of 32 rows.
     requantizer_lanes: 128,
     requantizer_depth_cycles: 4,
     skip_lanes: 128,
     // Two jobs.
-    output_queue_texels: 256,
+    filter_lanes: 64,
+    filter_depth_cycles: 4,
+    output_queue_pixels: 256,
     // Two texels of eight channels.
     output_channels_per_cycle: 16,
+    cache: CacheKind::Finite,
+    replacement: Replacement::Lru,
+    misses: Misses::HitUnderMiss,
+    dataflow: Dataflow::WeightStationary,
+    wiring: Wiring::Broadcast,
 };
 
 impl Unit {

@@ -165,7 +165,7 @@ impl<'a> Engine<'a> {
         let mut changed = false;
         if self.compute.is_done(now) {
             let texels = self.cost.texels_of_job(self.handed_over);
-            if self.output_texels + texels <= u64::from(self.cost.unit.output_queue_texels) {
+            if self.output_texels + texels <= u64::from(self.cost.unit.output_queue_pixels) {
                 self.compute.release();
                 self.handed_over += 1;
                 self.output.push_back(texels);

@@ -3,56 +3,120 @@
 //! The table below is the only place that knows the fields: the struct, its limits, [`FIELDS`] and
 //! [`Configuration::set`] are read off it. A [`Unit`] is the proof that a configuration can be built.
 
+use super::choice::{CacheKind, Dataflow, Misses, Replacement, Wiring};
 use std::fmt;
+
+/// What a field may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Range {
+    /// A number, from the smallest to the largest.
+    Number {
+        /// The smallest.
+        low: u32,
+        /// The largest.
+        high: u32,
+    },
+    /// One of these names.
+    Choice(&'static [&'static str]),
+}
+
+/// What a field is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Value {
+    /// A number, in the field's unit.
+    Number(u32),
+    /// A choice, by name.
+    Choice(&'static str),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Value::Number(number) => f.pad_integral(true, "", &number.to_string()),
+            Value::Choice(name) => f.pad(name),
+        }
+    }
+}
 
 /// One field of a [`Configuration`]: what it is called, counted in, and limited to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Its name.
     pub name: &'static str,
-    /// What it counts.
+    /// What it counts; empty for a choice.
     pub unit: &'static str,
-    /// The smallest value.
-    pub low: u32,
-    /// The largest value.
-    pub high: u32,
+    /// What it may be.
+    pub range: Range,
     /// What it means, for tables.
     pub summary: &'static str,
 }
 
 macro_rules! configuration {
-    ($( $(#[doc = $doc:literal])+ $field:ident [$unit:literal] $low:literal ..= $high:literal, )*) => {
-        /// The numbers of a unit, unchecked.
+    (
+        numbers { $( $(#[doc = $doc:literal])+ $field:ident [$unit:literal] $low:literal ..= $high:literal, )* }
+        choices { $( $(#[doc = $choice_doc:literal])+ $choice:ident : $type:ident, )* }
+    ) => {
+        /// The numbers and choices of a unit, unchecked.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub struct Configuration {
             $( $(#[doc = $doc])+ #[doc = concat!("\n\nIn ", $unit, ", ", $low, " to ", $high, ".")]
                pub $field: u32, )*
+            $( $(#[doc = $choice_doc])+ pub $choice: $type, )*
         }
 
-        /// The fields of a [`Configuration`], in the order of the texel's journey.
-        pub const FIELDS: &[Field] = &[ $( Field {
-            name: stringify!($field),
-            unit: $unit,
-            low: $low,
-            high: $high,
-            summary: concat!($( $doc ),+),
-        }, )* ];
+        /// The fields of a [`Configuration`]: the numbers in the order of the texel's journey, then
+        /// the choices.
+        pub const FIELDS: &[Field] = &[
+            $( Field {
+                name: stringify!($field),
+                unit: $unit,
+                range: Range::Number { low: $low, high: $high },
+                summary: concat!($( $doc ),+),
+            }, )*
+            $( Field {
+                name: stringify!($choice),
+                unit: "",
+                range: Range::Choice($type::NAMES),
+                summary: concat!($( $choice_doc ),+),
+            }, )*
+        ];
 
         impl Configuration {
             /// Every field with its value, in the order of [`FIELDS`].
             #[must_use]
-            pub fn fields(&self) -> Vec<(&'static Field, u32)> {
-                FIELDS.iter().zip([ $( self.$field ),* ]).collect()
+            pub fn fields(&self) -> Vec<(&'static Field, Value)> {
+                let numbers = [ $( Value::Number(self.$field) ),* ];
+                let choices = [ $( Value::Choice(self.$choice.name()) ),* ];
+                FIELDS.iter().zip(numbers.into_iter().chain(choices)).collect()
             }
 
-            /// Gives a field another value, by name.
+            /// Gives a number another value, by name.
             ///
             /// # Errors
-            /// When there is no such field. The value is checked by [`Unit::new`].
+            /// When there is no such number. The value is checked by [`Unit::new`].
             pub fn set(&mut self, name: &str, value: u32) -> Result<(), UnitError> {
                 match name {
                     $( stringify!($field) => self.$field = value, )*
                     _ => return Err(UnitError::Field { found: name.to_owned() }),
+                }
+                Ok(())
+            }
+
+            /// Makes another choice, both by name.
+            ///
+            /// # Errors
+            /// When there is no such choice, or it has no such name.
+            pub fn choose(&mut self, field: &str, name: &str) -> Result<(), UnitError> {
+                match field {
+                    $( stringify!($choice) => match $type::by_name(name) {
+                        Some(choice) => self.$choice = choice,
+                        None => return Err(UnitError::Choice {
+                            field: stringify!($choice),
+                            found: name.to_owned(),
+                            allowed: $type::NAMES,
+                        }),
+                    }, )*
+                    _ => return Err(UnitError::Field { found: field.to_owned() }),
                 }
                 Ok(())
             }
@@ -61,14 +125,26 @@ macro_rules! configuration {
 }
 
 configuration! {
+    numbers {
     /// Clock. It turns cycles into seconds in a report and changes nothing else.
     clock_mhz ["MHz"] 1..=10_000,
-    /// Requests that the shader cores hand over in a cycle.
-    requests_per_cycle ["texels"] 1..=1024,
-    /// Requests that wait in front of the address generators.
+    /// Pixels whose demands the shader cores hand over in a cycle.
+    requests_per_cycle ["pixels"] 1..=1024,
+    /// Successive pixels of one material whose equal texels are decoded once: 1 for none, 4 for a
+    /// quad.
+    quad_pixels ["pixels"] 1..=16,
+    /// Blocks of the decoded-texel cache: what was decoded is kept, and filtered from again. 0 for
+    /// none.
+    decoded_cache_blocks ["blocks"] 0..=65_536,
+    /// Ways of the decoded-texel cache, least recently used replaced first.
+    decoded_cache_ways ["ways"] 1..=256,
+    /// Texels along the side of a block of the decoded-texel cache, a power of two. A miss decodes
+    /// the whole block.
+    decoded_block_side ["texels"] 1..=8,
+    /// Texels that wait in front of the address generators.
     request_queue_texels ["texels"] 1..=65_536,
-    /// Successive requests that go through the front end together and whose lines are looked up
-    /// once: 1 for none, 4 for a quad (Skybox, `dups` in `VX_tex_mem.sv`).
+    /// Texels that go through the front end together and whose lines are looked up once: 1 for
+    /// none, 4 for a quad (Skybox, `dups` in `VX_tex_mem.sv`).
     coalesced_texels ["texels"] 1..=64,
     /// Grid positions computed in a cycle; a texel needs one for each grid.
     address_generators ["positions per cycle"] 1..=1024,
@@ -86,7 +162,16 @@ configuration! {
     hit_latency_cycles ["cycles"] 0..=1000,
     /// Lines under way from memory. A second miss of a line joins the first.
     mshrs ["lines"] 1..=4096,
-    /// From a miss to the first byte, with nothing in between.
+    /// Sets of the second-level cache, a power of two; its lines are those of the latent cache. 0
+    /// for none.
+    level2_sets ["sets"] 0..=1_048_576,
+    /// Ways of the second-level cache.
+    level2_ways ["ways"] 1..=256,
+    /// From a miss to the first byte, for a line that the second level holds; 0 without one.
+    level2_latency_cycles ["cycles"] 0..=100_000,
+    /// Bytes that the second level delivers in a cycle.
+    level2_bytes_per_cycle ["bytes per cycle"] 1..=1_048_576,
+    /// From a miss of the last cache to the first byte, with nothing in between.
     memory_latency_cycles ["cycles"] 0..=100_000,
     /// Bytes of latents that memory delivers in a cycle.
     memory_bytes_per_cycle ["bytes per cycle"] 1..=1_048_576,
@@ -107,13 +192,21 @@ configuration! {
     /// Batches of a job. They take turns at the array, layer by layer, so that one is multiplied
     /// while another is requantised.
     batches_in_flight ["batches"] 1..=16,
+    /// Jobs that are gathered at the same time, each of one material. 1 closes a job whenever the
+    /// material changes.
+    material_bins ["jobs"] 1..=256,
     /// Bytes of parameters that stay in the unit. Layers that do not fit are streamed for each batch.
     weight_sram_bytes ["bytes"] 0..=268_435_456,
     /// Bytes of parameters that come from outside in a cycle, on a port of their own.
     weight_fill_bytes_per_cycle ["bytes per cycle"] 1..=1_048_576,
+    /// From asking for parameters to the first byte.
+    weight_latency_cycles ["cycles"] 0..=100_000,
     /// From weight SRAM to the array's shadow registers, for a tile of bytes, and twice as long for
     /// one of halves; hidden behind the pass before it as far as that is as long.
     tile_load_cycles ["cycles"] 1..=4096,
+    /// Tiles that the array's registers hold: 2 hides the load of the next behind a pass, 1 does
+    /// not.
+    tile_buffers ["tiles"] 1..=2,
     /// Outputs of a tile of weights.
     mac_rows ["rows"] 1..=1024,
     /// Inputs of a tile of weights.
@@ -126,6 +219,9 @@ configuration! {
     /// Passes of the array for halves: 2 is the published ratio of int8 to fp16 rates of GPU matrix
     /// units (NVIDIA A100: 624 and 312 TOPS); 1 is an array built for fp16.
     half_passes ["passes"] 1..=64,
+    /// Columns that a column of multipliers stands for where weights have at most 4 bits and values
+    /// at most 8: 2 where a multiplier of bytes splits into two (NVIDIA A100: int4 at twice int8).
+    narrow_columns ["columns"] 1..=8,
     /// From the last input of a pass to its last accumulator.
     mac_depth_cycles ["cycles"] 0..=1000,
     /// Wide multiplications in a cycle, on accumulators.
@@ -134,10 +230,27 @@ configuration! {
     requantizer_depth_cycles ["cycles"] 0..=1000,
     /// Activations read from the residual store, and rescaled or added, in a cycle.
     skip_lanes ["activations per cycle"] 1..=65_536,
-    /// Decoded texels that wait to leave the unit.
-    output_queue_texels ["texels"] 1..=1_048_576,
+    /// Weighted codes that the filter adds in a cycle; a single texel passes without.
+    filter_lanes ["codes per cycle"] 1..=65_536,
+    /// From the last code to the filtered one.
+    filter_depth_cycles ["cycles"] 0..=1000,
+    /// Pixels that wait to leave the unit.
+    output_queue_pixels ["pixels"] 1..=1_048_576,
     /// Channels that leave the unit in a cycle.
     output_channels_per_cycle ["channels per cycle"] 1..=65_536,
+    }
+    choices {
+    /// What the latent cache holds; `none` and `infinite` are the brackets of a result.
+    cache: CacheKind,
+    /// Which line of a set of the latent cache, and of the second level, is replaced.
+    replacement: Replacement,
+    /// What happens behind a miss of the latent cache.
+    misses: Misses,
+    /// What stays in the MAC array.
+    dataflow: Dataflow,
+    /// How operands reach the multipliers.
+    wiring: Wiring,
+    }
 }
 
 /// Why a configuration is no unit.
@@ -182,6 +295,15 @@ pub enum UnitError {
         holds: &'static str,
         /// The smallest value.
         allowed: u32,
+    },
+    /// A choice has no such name.
+    Choice {
+        /// The field.
+        field: &'static str,
+        /// The name found.
+        found: String,
+        /// The names that it has.
+        allowed: &'static [&'static str],
     },
     /// No field has this name.
     Field {
@@ -231,6 +353,14 @@ impl fmt::Display for UnitError {
                     "unit.{field}: found {found}; allowed: at least {allowed}, {holds}"
                 )
             }
+            UnitError::Choice {
+                field,
+                found,
+                allowed,
+            } => {
+                let names = allowed.join(", ");
+                write!(f, "unit.{field}: found {found:?}; allowed: {names}")
+            }
             UnitError::Field { found } => {
                 let names: Vec<&str> = FIELDS.iter().map(|field| field.name).collect();
                 write!(
@@ -271,19 +401,13 @@ impl Unit {
     /// The first field that is out of range or contradicts another.
     pub fn new(name: impl Into<String>, configuration: Configuration) -> Result<Unit, UnitError> {
         let c = &configuration;
-        for (
-            &Field {
-                name: field,
-                low,
-                high,
-                ..
-            },
-            found,
-        ) in c.fields()
-        {
-            if !(low..=high).contains(&found) {
+        for (field, value) in c.fields() {
+            // A choice is one of its own by its type.
+            if let (Range::Number { low, high }, Value::Number(found)) = (field.range, value)
+                && !(low..=high).contains(&found)
+            {
                 return Err(UnitError::Range {
-                    field,
+                    field: field.name,
                     found,
                     low,
                     high,
@@ -295,6 +419,9 @@ impl Unit {
             ("cache_sets", c.cache_sets),
             ("cache_banks", c.cache_banks),
             ("burst_bytes", c.burst_bytes),
+            ("decoded_block_side", c.decoded_block_side),
+            // None is allowed too.
+            ("level2_sets", c.level2_sets.max(1)),
         ] {
             if !found.is_power_of_two() {
                 return Err(UnitError::PowerOfTwo { field, found });
@@ -323,8 +450,8 @@ impl Unit {
                 c.coalesced_texels,
             ),
             (
-                "output_queue_texels",
-                c.output_queue_texels,
+                "output_queue_pixels",
+                c.output_queue_pixels,
                 "one job",
                 c.job_texels(),
             ),
@@ -426,15 +553,18 @@ mod tests {
     #[test]
     fn every_field_is_set_by_name_and_refused_just_outside_its_range() {
         for field in FIELDS {
-            let refused = [field.low.checked_sub(1), field.high.checked_add(1)];
+            let Range::Number { low, high } = field.range else {
+                continue;
+            };
+            let refused = [low.checked_sub(1), high.checked_add(1)];
             for found in refused.into_iter().flatten() {
                 let mut changed = *Unit::mobile().configuration();
                 changed.set(field.name, found).unwrap();
                 let expected = UnitError::Range {
                     field: field.name,
                     found,
-                    low: field.low,
-                    high: field.high,
+                    low,
+                    high,
                 };
                 assert_eq!(Unit::new("x", changed), Err(expected));
             }
@@ -466,8 +596,8 @@ mod tests {
             "unit.corner_fifo_texels: found 3; allowed: at least 4, one coalesced group"
         );
         assert_eq!(
-            refused("output_queue_texels", 15),
-            "unit.output_queue_texels: found 15; allowed: at least 16, one job"
+            refused("output_queue_pixels", 15),
+            "unit.output_queue_pixels: found 15; allowed: at least 16, one job"
         );
     }
 

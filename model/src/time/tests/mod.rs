@@ -160,6 +160,8 @@ fn a_line_is_looked_up_once_for_the_texels_of_a_group_and_a_cell_may_lie_in_two(
         grid: 0,
         addresses: [60, 60, 64, 0],
         cell_bytes: 8,
+        planes: 1,
+        plane_bytes: 0,
     });
     straddling.end_texel();
     assert_eq!(lookups(1, &straddling), (2, 2));

@@ -2,7 +2,7 @@
 
 use crate::request::Request;
 use crate::time::fixture::{Hidden, Kind, Sketch, asset, trace_of};
-use crate::time::unit::FIELDS;
+use crate::time::unit::{FIELDS, Range, Value};
 use crate::time::{Unit, simulate, simulate_with_stride};
 use crate::trace::Trace;
 use ntmu_isa::activation::Activation;
@@ -32,8 +32,11 @@ fn any_unit() -> impl Strategy<Value = Unit> {
     raw.prop_map(|raw| {
         let mut c = *Unit::mobile().configuration();
         for (field, (raw, is_wide)) in FIELDS.iter().zip(raw) {
-            let high = ceiling(field.name, is_wide).clamp(field.low, field.high);
-            let value = field.low + raw % (high - field.low + 1);
+            let Range::Number { low, high } = field.range else {
+                continue;
+            };
+            let high = ceiling(field.name, is_wide).clamp(low, high);
+            let value = low + raw % (high - low + 1);
             c.set(field.name, value).unwrap();
         }
         c.coalesced_texels = [1, 2, 4, 8][c.coalesced_texels as usize % 4];
@@ -43,14 +46,16 @@ fn any_unit() -> impl Strategy<Value = Unit> {
             &mut c.cache_sets,
             &mut c.cache_banks,
             &mut c.burst_bytes,
+            &mut c.level2_sets,
         ] {
             *power = power.next_power_of_two().min(64);
         }
+        c.decoded_block_side = 1 << (c.decoded_block_side % 4);
         for queue in [&mut c.request_queue_texels, &mut c.corner_fifo_texels] {
             *queue = (*queue).max(c.coalesced_texels);
         }
-        c.output_queue_texels = c
-            .output_queue_texels
+        c.output_queue_pixels = c
+            .output_queue_pixels
             .max(c.batch_texels * c.batches_in_flight);
         Unit::new("random", c).unwrap()
     })
@@ -178,11 +183,12 @@ proptest! {
         for name in [
             "requests_per_cycle", "request_queue_texels", "address_generators", "cache_ways",
             "corner_fifo_texels", "unpack_lanes", "interpolator_lanes", "embed_lanes", "mac_rows",
-            "mac_columns", "mac_arrays", "requantizer_lanes", "skip_lanes", "output_queue_texels",
+            "mac_columns", "mac_arrays", "requantizer_lanes", "skip_lanes", "output_queue_pixels",
             "output_channels_per_cycle",
         ] {
             let mut more = *unit.configuration();
             let (_, value) = more.fields().into_iter().find(|(field, _)| field.name == name).unwrap();
+            let Value::Number(value) = value else { continue };
             more.set(name, value + 1).unwrap();
             let after = simulate(&Unit::new("more", more).unwrap(), &asset, &program, &trace).cycles;
             prop_assert!(after <= before, "{}: {} cycles, then {}", name, before, after);
