@@ -9,6 +9,7 @@
 pub mod demand;
 pub mod engine;
 pub mod exec;
+pub mod material;
 pub mod place;
 pub mod request;
 pub mod sampler;
@@ -16,5 +17,6 @@ pub mod time;
 pub mod trace;
 
 pub use demand::{Demand, Demands};
+pub use material::Material;
 pub use place::{Place, PlaceError};
 pub use request::{Request, RequestError};

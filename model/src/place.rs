@@ -174,6 +174,20 @@ impl Place {
         }
     }
 
+    /// The texel whose centre and level this is, if it is one, of the mip or around it.
+    pub(crate) fn texel(self) -> Option<Request> {
+        let centre = 1_i64 << (self.bits - 1);
+        let texel = |coordinate: i64| {
+            let is_centre = coordinate & ((1 << self.bits) - 1) == centre;
+            u32::try_from(coordinate >> self.bits)
+                .ok()
+                .filter(|_| is_centre)
+        };
+        let is_level = self.lod == u32::from(self.mip) << self.lod_bits;
+        let (x, y) = (texel(self.x)?, texel(self.y)?);
+        is_level.then_some(Request::within(x, y, self.mip))
+    }
+
     /// From the left edge of texel 0, in 1/2^[`Place::bits`] texels.
     #[must_use]
     pub const fn x(self) -> i64 {

@@ -26,6 +26,9 @@ pub trait Addresses {
 
     /// Bytes from address 0 on that fetches can touch.
     fn bytes(&self) -> u64;
+
+    /// Columns and rows of a mip's texels.
+    fn mip_size(&self, mip: u8) -> (u32, u32);
 }
 
 /// The fetches of a run of texels, in request order.

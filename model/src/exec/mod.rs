@@ -15,10 +15,12 @@ mod output;
 mod position;
 mod probe;
 mod taps;
+mod tracer;
 
 pub use position::Corners;
 pub use probe::Probe;
 pub use taps::{GridTap, LayerTap, Taps};
+pub use tracer::Tracer;
 
 use crate::place::Place;
 use crate::request::Request;

@@ -1,18 +1,23 @@
-//! Cost: how long each stage of a unit takes for one thing of its size.
+//! Cost: how long each stage of a unit takes for one thing of its size, for one material.
 //!
-//! Three sizes: a *group* of coalesced texels goes through the front end together, a *batch* passes
-//! the MAC array under one tile of weights, a *job* is the batches that are in the array together.
-//! The stepped model puts these costs one after the other; the closed form sums them.
+//! Three sizes: a *group* of texels goes through the front end together, a *batch* passes the MAC
+//! array under one tile of weights, a *job* is the batches that are in the array together. The
+//! stepped model puts these costs one after the other; the lower bounds sum them.
 
+use super::assemble::Group;
+use super::choice::{Dataflow, Wiring};
 use super::unit::Unit;
-use super::work::{Operands, Work};
+use super::work::{Dense, Operands, Work};
+use crate::material::Material;
 
 /// The MAC array's cycles for one row of tiles and one batch, by what the array does in them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct RowCycles {
-    /// Texels pass.
+    /// Texels or inputs pass.
     pub(super) compute: u64,
-    /// The next tile is not in the shadow registers yet.
+    /// Operands are on their way through a systolic array.
+    pub(super) skew: u64,
+    /// The next tile is not in the array's registers yet.
     pub(super) load: u64,
     /// The weights are not in the unit yet.
     pub(super) fill: u64,
@@ -20,7 +25,7 @@ pub(super) struct RowCycles {
 
 impl RowCycles {
     pub(super) fn total(self) -> u64 {
-        self.compute + self.load + self.fill
+        self.compute + self.skew + self.load + self.fill
     }
 }
 
@@ -29,13 +34,16 @@ impl RowCycles {
 pub(super) struct LayerCost {
     /// Rows of tiles.
     pub(super) row_tiles: u64,
-    /// Columns of tiles.
+    /// Columns of tiles, where weights stay in the array.
     pub(super) column_tiles: u64,
+    inputs: u64,
     outputs: u64,
     rows: u64,
     /// Passes of the array for a product.
     passes: u64,
-    /// Cycles in which a tile of its weights comes to the shadow registers.
+    /// Products of a multiplier in a pass.
+    products: u64,
+    /// Cycles in which a tile of its weights comes to the array's registers.
     tile_load: u64,
     /// Requantiser slots of an output.
     slots: u64,
@@ -46,6 +54,9 @@ pub(super) struct LayerCost {
     fill: [u64; 2],
     /// Bytes that come from outside for each batch.
     pub(super) streamed_bytes: u64,
+    /// Bits of a weight in the weight SRAM.
+    weight_bits: u64,
+    pub(super) operands: Operands,
 }
 
 impl LayerCost {
@@ -68,26 +79,44 @@ impl LayerCost {
     pub(super) fn skips(&self, outputs: u64) -> u64 {
         outputs * self.skips
     }
-}
 
-/// Bytes of a weight on its way to the array. Narrow ones take a byte each.
-const fn weight_bytes(operands: Operands) -> u64 {
-    match operands {
-        Operands::Bytes | Operands::Wide => 1,
-        Operands::Half => 2,
+    /// Multiplications of one texel.
+    pub(super) fn macs(&self) -> u64 {
+        self.inputs * self.outputs
+    }
+
+    /// Bytes that the weight SRAM gives the array for one batch.
+    pub(super) fn weight_bytes_per_batch(&self) -> u64 {
+        (self.inputs * self.outputs * self.weight_bits).div_ceil(8)
+    }
+
+    /// Bytes of activations that the array reads, and that are written back, for one texel.
+    pub(super) fn activation_bytes(&self) -> u64 {
+        let bytes = match self.operands {
+            Operands::Narrow | Operands::Bytes => 1,
+            Operands::Wide | Operands::Half => 2,
+        };
+        (self.inputs * self.row_tiles + self.outputs) * bytes
     }
 }
 
-/// A program of so many texels on one unit.
+/// Bits of a weight on its way to the array.
+const fn weight_bits(operands: Operands) -> u64 {
+    match operands {
+        Operands::Narrow => 4,
+        Operands::Bytes | Operands::Wide => 8,
+        Operands::Half => 16,
+    }
+}
+
+/// One material on one unit.
 #[derive(Clone, Debug)]
 pub(super) struct Cost<'a> {
     pub(super) unit: &'a Unit,
+    pub(super) material: &'a Material<'a>,
     pub(super) work: &'a Work,
-    pub(super) texels: u64,
-    /// Groups of coalesced texels.
-    pub(super) groups: u64,
-    pub(super) groups_per_job: u64,
-    pub(super) jobs: u64,
+    /// Where its latents start in memory.
+    pub(super) base: u64,
     pub(super) layers: Vec<LayerCost>,
     /// Bytes of the layers that stay in the unit.
     pub(super) resident_bytes: u64,
@@ -95,8 +124,27 @@ pub(super) struct Cost<'a> {
     pub(super) streamed_bytes: u64,
 }
 
+/// Where the next material's latents may start: a page.
+const MATERIAL_ALIGNMENT: u64 = 4096;
+
 impl<'a> Cost<'a> {
-    pub(super) fn new(unit: &'a Unit, work: &'a Work, texels: u64) -> Cost<'a> {
+    /// Every material on a unit, their latents one after the other in memory.
+    pub(super) fn all(unit: &'a Unit, materials: &'a [Material<'a>]) -> Vec<Cost<'a>> {
+        let mut base = 0;
+        let place = |material| {
+            let cost = Cost::new(unit, material, base);
+            base += cost
+                .material
+                .addresses()
+                .bytes()
+                .next_multiple_of(MATERIAL_ALIGNMENT);
+            cost
+        };
+        materials.iter().map(place).collect()
+    }
+
+    fn new(unit: &'a Unit, material: &'a Material<'a>, base: u64) -> Cost<'a> {
+        let work = material.work();
         let mut resident: Vec<(u16, bool)> = Vec::new();
         let mut resident_bytes = 0;
         let mut layers = Vec::new();
@@ -112,58 +160,17 @@ impl<'a> Cost<'a> {
                     stays
                 }
             };
-            let (outputs, rows) = (u64::from(dense.outputs), u64::from(unit.mac_rows));
-            let row_tiles = outputs.div_ceil(rows);
-            let last = outputs - (row_tiles - 1) * rows;
-            let fill = |rows: u64| {
-                let bytes = (dense.parameter_bytes * rows).div_ceil(outputs);
-                bytes.div_ceil(u64::from(unit.weight_fill_bytes_per_cycle))
-            };
-            layers.push(LayerCost {
-                row_tiles,
-                column_tiles: u64::from(dense.inputs).div_ceil(u64::from(unit.mac_columns)),
-                outputs,
-                rows,
-                passes: u64::from(match dense.operands {
-                    Operands::Bytes => 1,
-                    Operands::Wide => unit.wide_passes,
-                    Operands::Half => unit.half_passes,
-                }),
-                tile_load: u64::from(unit.tile_load_cycles) * weight_bytes(dense.operands),
-                slots: u64::from(dense.requantizer_slots) / outputs,
-                skips: u64::from(dense.skip_reads) / outputs,
-                fill: if stays {
-                    [0, 0]
-                } else {
-                    [fill(rows.min(outputs)), fill(last)]
-                },
-                streamed_bytes: if stays { 0 } else { dense.parameter_bytes },
-            });
+            layers.push(layer_cost(unit, dense, stays));
         }
-        let job_texels = u64::from(unit.job_texels());
         Cost {
             unit,
+            material,
             work,
-            texels,
-            groups: texels.div_ceil(u64::from(unit.coalesced_texels)),
-            groups_per_job: job_texels / u64::from(unit.coalesced_texels),
-            jobs: texels.div_ceil(job_texels),
+            base,
             streamed_bytes: layers.iter().map(|layer| layer.streamed_bytes).sum(),
             layers,
             resident_bytes,
         }
-    }
-
-    /// Texels of a group: full, except perhaps the last.
-    pub(super) fn texels_of_group(&self, group: u64) -> u64 {
-        let full = u64::from(self.unit.coalesced_texels);
-        full.min(self.texels - group * full)
-    }
-
-    /// Texels of a job: full, except perhaps the last.
-    pub(super) fn texels_of_job(&self, job: u64) -> u64 {
-        let full = u64::from(self.unit.job_texels());
-        full.min(self.texels - job * full)
     }
 
     /// Texels of each batch of a job of so many texels.
@@ -173,64 +180,146 @@ impl<'a> Cost<'a> {
     }
 
     /// Cycles in which a group's requests come in.
-    pub(super) fn request(&self, texels: u64) -> u64 {
-        texels.div_ceil(u64::from(self.unit.requests_per_cycle))
+    pub(super) fn request(&self, group: &Group) -> u64 {
+        let cycles = group
+            .pixels
+            .div_ceil(u64::from(self.unit.requests_per_cycle));
+        cycles.max(1)
     }
 
     /// Cycles of the address generators for a group.
-    pub(super) fn address(&self, texels: u64) -> u64 {
-        let positions = texels * u64::from(self.work.positions);
-        positions
-            .div_ceil(u64::from(self.unit.address_generators))
-            .max(1)
-    }
-
-    /// The fewest cycles of the tags for a group: one for each fetch, without conflicts.
-    pub(super) fn lookup(&self) -> u64 {
-        u64::from(self.work.fetches).max(1)
+    pub(super) fn address(&self, group: &Group) -> u64 {
+        let steps = group.decodes * u64::from(self.work.address_steps);
+        let cycles = steps.div_ceil(u64::from(self.unit.address_generators));
+        cycles.max(1)
     }
 
     /// Cycles of unpacking, interpolation, waves and level for a group; they work side by side.
-    pub(super) fn embed(&self, texels: u64) -> u64 {
+    pub(super) fn embed(&self, group: &Group) -> u64 {
         let (unit, work) = (self.unit, self.work);
         let cycles = [
             (work.unpacked, unit.unpack_lanes),
             (work.interpolated, unit.interpolator_lanes),
             (work.embedded, unit.embed_lanes),
         ]
-        .map(|(inputs, lanes)| (texels * u64::from(inputs)).div_ceil(u64::from(lanes)));
+        .map(|(inputs, lanes)| (group.decodes * u64::from(inputs)).div_ceil(u64::from(lanes)));
         cycles.into_iter().fold(1, u64::max)
     }
 
-    /// Cycles in which a job's channels leave the unit.
-    pub(super) fn output(&self, texels: u64) -> u64 {
-        let channels = texels * u64::from(self.work.channels);
-        channels
-            .div_ceil(u64::from(self.unit.output_channels_per_cycle))
-            .max(1)
+    /// Cycles of the filter for so many weighted codes of each channel.
+    pub(super) fn filter(&self, weighted: u64) -> u64 {
+        if weighted == 0 {
+            return 0;
+        }
+        let codes = weighted * u64::from(self.work.channels);
+        codes.div_ceil(u64::from(self.unit.filter_lanes)) + u64::from(self.unit.filter_depth_cycles)
+    }
+
+    /// Cycles in which the channels of so many pixels leave the unit.
+    pub(super) fn output(&self, pixels: u64) -> u64 {
+        let channels = pixels * u64::from(self.work.channels);
+        let cycles = channels.div_ceil(u64::from(self.unit.output_channels_per_cycle));
+        cycles.max(u64::from(pixels > 0))
+    }
+
+    /// Cycles in which so many bytes of parameters come in, without the latency.
+    pub(super) fn fill(&self, bytes: u64) -> u64 {
+        bytes.div_ceil(u64::from(self.unit.weight_fill_bytes_per_cycle))
     }
 
     /// Cycles in which the weights that stay come in, before the first request.
-    pub(super) fn weight_fill(&self) -> u64 {
-        self.resident_bytes
-            .div_ceil(u64::from(self.unit.weight_fill_bytes_per_cycle))
+    pub(super) fn first_fill(&self) -> u64 {
+        if self.resident_bytes == 0 {
+            return 0;
+        }
+        u64::from(self.unit.weight_latency_cycles) + self.fill(self.resident_bytes)
     }
 
-    /// The array's cycles for one row of tiles of a layer and a batch of so many texels: a pass for
-    /// each column of tiles, of as many cycles as an array has texels, or a multiple where operands
-    /// are wider than bytes.
+    /// The array's cycles for one row of tiles of a layer and a batch of so many texels.
+    ///
+    /// Weight-stationary: a pass for each column of tiles, of as many cycles as an array has texels.
+    /// Output-stationary: a pass for each `columns` texels of an array, of as many cycles as there are
+    /// inputs. Both a multiple of that where operands are wider than bytes.
     pub(super) fn row(&self, layer: usize, row_tile: u64, texels: u64) -> RowCycles {
-        let cost = &self.layers[layer];
-        let pass = texels.div_ceil(u64::from(self.unit.mac_arrays)) * cost.passes;
-        let loaded = pass.max(cost.tile_load);
-        let compute = cost.column_tiles * pass;
-        let load = cost.column_tiles * (loaded - pass);
+        let (cost, unit) = (&self.layers[layer], self.unit);
+        let texels = texels.div_ceil(u64::from(unit.mac_arrays));
+        let columns = u64::from(unit.mac_columns);
+        let skew = match unit.wiring {
+            Wiring::Broadcast => 0,
+            Wiring::Systolic => u64::from(unit.mac_rows) + columns - 2,
+        };
+        let (passes, compute, skew, load) = match unit.dataflow {
+            Dataflow::WeightStationary => {
+                let pass = texels * cost.passes;
+                let load = if unit.tile_buffers > 1 {
+                    cost.tile_load.saturating_sub(pass + skew)
+                } else {
+                    cost.tile_load
+                };
+                (cost.column_tiles, pass, skew, load)
+            }
+            Dataflow::OutputStationary => {
+                let pass = cost.inputs.div_ceil(cost.products) * cost.passes;
+                let drain = match unit.wiring {
+                    Wiring::Broadcast => 0,
+                    Wiring::Systolic => u64::from(unit.mac_rows),
+                };
+                (texels.div_ceil(columns), pass, skew + drain, 0)
+            }
+        };
+        let mut row = RowCycles {
+            compute: passes * compute,
+            skew: passes * skew,
+            load: passes * load,
+            fill: 0,
+        };
         let is_last = row_tile + 1 == cost.row_tiles;
-        let fill = cost.fill[usize::from(is_last)].saturating_sub(compute + load);
-        RowCycles {
-            compute,
-            load,
-            fill,
-        }
+        row.fill = cost.fill[usize::from(is_last)].saturating_sub(row.total());
+        row
+    }
+}
+
+fn layer_cost(unit: &Unit, dense: &Dense, stays: bool) -> LayerCost {
+    let (inputs, outputs) = (u64::from(dense.inputs), u64::from(dense.outputs));
+    let rows = u64::from(unit.mac_rows);
+    let row_tiles = outputs.div_ceil(rows);
+    let last = outputs - (row_tiles - 1) * rows;
+    let fill = |rows: u64| {
+        let bytes = (dense.parameter_bytes * rows).div_ceil(outputs);
+        bytes.div_ceil(u64::from(unit.weight_fill_bytes_per_cycle))
+    };
+    let products = match dense.operands {
+        Operands::Narrow => u64::from(unit.narrow_columns),
+        Operands::Bytes | Operands::Wide | Operands::Half => 1,
+    };
+    let passes = match dense.operands {
+        Operands::Narrow | Operands::Bytes => 1,
+        Operands::Wide => unit.wide_passes,
+        Operands::Half => unit.half_passes,
+    };
+    // A tile comes in at bytes a multiplier; narrow ones fill their multiplier with all they hold.
+    let tile_load = match dense.operands {
+        Operands::Narrow | Operands::Bytes | Operands::Wide => 1,
+        Operands::Half => 2,
+    };
+    LayerCost {
+        row_tiles,
+        column_tiles: inputs.div_ceil(u64::from(unit.mac_columns) * products),
+        inputs,
+        outputs,
+        rows,
+        passes: u64::from(passes),
+        products,
+        tile_load: u64::from(unit.tile_load_cycles) * tile_load,
+        slots: u64::from(dense.requantizer_slots) / outputs,
+        skips: u64::from(dense.skip_reads) / outputs,
+        fill: if stays {
+            [0, 0]
+        } else {
+            [fill(rows.min(outputs)), fill(last)]
+        },
+        streamed_bytes: if stays { 0 } else { dense.parameter_bytes },
+        weight_bits: weight_bits(dense.operands),
+        operands: dense.operands,
     }
 }

@@ -1,8 +1,11 @@
 //! What the tests run: small assets, their traces, and units.
 
-use super::Unit;
+use super::{Timing, Unit, work_of};
+use crate::demand::Demand;
+use crate::material::Material;
+use crate::place::Place;
 use crate::request::Request;
-use crate::trace::{Fetch, Trace};
+use crate::trace::{Addresses, Fetch};
 use ntmu_isa::activation::{Activation, TABLE_ENTRIES};
 use ntmu_isa::asset::{Encoding, Map, Metadata, Parts};
 use ntmu_isa::embed::Wave;
@@ -10,7 +13,7 @@ use ntmu_isa::half::Half;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
 use ntmu_isa::layout::Layout;
-use ntmu_isa::position::{AddressMode, AxisPosition, CornerSnap};
+use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
@@ -168,42 +171,94 @@ pub(super) fn asset(sketch: &Sketch) -> Asset {
     .unwrap()
 }
 
-/// The fetches that the program of `layout` makes for these requests, from the specification.
-pub(super) fn trace_of(
-    asset: &Asset,
-    layout: Layout,
-    requests: impl Iterator<Item = Request>,
-) -> Trace {
-    let shape = &asset.shape;
-    let mut trace = Trace::new();
-    for request in requests {
-        for (index, grid) in shape.grids.iter().enumerate() {
-            let corners = |texel, size| {
-                AxisPosition::of(texel, request.mip(), grid.scale_log2, shape.snap)
-                    .corners(size, shape.address_mode)
-            };
-            let (width, height) = shape.grid_size(index);
-            let (x, y) = (corners(request.x(), width), corners(request.y(), height));
-            let cells = [(x[0], y[0]), (x[1], y[0]), (x[0], y[1]), (x[1], y[1])];
-            trace.fetch(Fetch {
-                grid: index as u8,
-                addresses: cells.map(|(x, y)| layout.address(shape, index, x, y)),
-                cell_bytes: Layout::cell_bytes(shape, index) as u32,
-                planes: 1,
-                plane_bytes: 0,
-            });
+/// What is asked of an asset's program.
+#[derive(Clone, Debug)]
+pub(super) enum Asked {
+    /// Texels, a pixel each.
+    Texels(Vec<Request>),
+    /// Decodes that touch these fetches, a pixel each.
+    Fetches(Vec<Fetch>),
+}
+
+impl Asked {
+    pub(super) fn count(&self) -> usize {
+        match self {
+            Asked::Texels(requests) => requests.len(),
+            Asked::Fetches(fetches) => fetches.len(),
         }
-        trace.end_texel();
     }
-    trace
+
+    /// A pixel for each.
+    pub(super) fn demands(&self) -> impl Iterator<Item = Demand> {
+        let texel = |n: usize| match self {
+            Asked::Texels(requests) => requests[n],
+            Asked::Fetches(_) => Request::within(n as u32, 0, 0),
+        };
+        (0..self.count()).map(move |n| demand(0, &[texel(n)]))
+    }
+
+    /// The material that they are asked of.
+    pub(super) fn material<'a>(&self, asset: &'a Asset, program: &'a Program) -> Material<'a> {
+        match self {
+            Asked::Texels(_) => Material::new("asset", asset, program),
+            Asked::Fetches(fetches) => {
+                let work = work_of(asset, program);
+                Material::with_addresses("fetches", work, Listed(fetches.clone()))
+            }
+        }
+    }
+}
+
+/// A pixel that needs these texels of a material.
+pub(super) fn demand(material: u16, texels: &[Request]) -> Demand {
+    Demand {
+        pixel: [0, 0],
+        material,
+        places: texels.iter().map(|&texel| Place::of(texel)).collect(),
+        weights: texels.len() as u32,
+    }
+}
+
+/// One fetch for the texel of each column.
+struct Listed(Vec<Fetch>);
+
+impl Addresses for Listed {
+    fn fetches(&self, place: &Place, fetches: &mut Vec<Fetch>) {
+        fetches.push(self.0[(place.x() >> place.bits()) as usize]);
+    }
+
+    fn bytes(&self) -> u64 {
+        1 << 20
+    }
+
+    fn mip_size(&self, _mip: u8) -> (u32, u32) {
+        (self.0.len() as u32, 1)
+    }
+}
+
+/// The run of a unit for what is asked of one asset.
+pub(super) fn simulate(unit: &Unit, asset: &Asset, program: &Program, asked: &Asked) -> Timing {
+    simulate_with_stride(unit, asset, program, asked, u64::MAX)
+}
+
+pub(super) fn simulate_with_stride(
+    unit: &Unit,
+    asset: &Asset,
+    program: &Program,
+    asked: &Asked,
+    stride: u64,
+) -> Timing {
+    let materials = [asked.material(asset, program)];
+    let run = super::run(unit, &materials, &mut asked.demands(), &mut (), 0, stride);
+    run.unwrap_or_else(|never| match never {})
 }
 
 /// Everything a run needs, for the blocks of a mip.
-pub(super) fn scan(sketch: &Sketch, layout: Layout) -> (Asset, Program, Trace) {
+pub(super) fn scan(sketch: &Sketch, layout: Layout) -> (Asset, Program, Asked) {
     let asset = asset(sketch);
     let program = Program::compile(&asset, layout);
-    let trace = trace_of(&asset, layout, Request::blocks(&asset.shape, 0));
-    (asset, program, trace)
+    let asked = Asked::Texels(Request::blocks(&asset.shape, 0).collect());
+    (asset, program, asked)
 }
 
 /// The preset `mobile` with some fields changed.
@@ -250,18 +305,14 @@ pub(super) fn hardware_sized() -> Sketch {
     }
 }
 
-/// A trace of single cells of one byte at these addresses, one fetch a texel.
-pub(super) fn addresses(addresses: &[[u64; 4]]) -> Trace {
-    let mut trace = Trace::new();
-    for &addresses in addresses {
-        trace.fetch(Fetch {
-            grid: 0,
-            addresses,
-            cell_bytes: 1,
-            planes: 1,
-            plane_bytes: 0,
-        });
-        trace.end_texel();
-    }
-    trace
+/// Single cells of one byte at these addresses, one fetch a texel.
+pub(super) fn addresses(addresses: &[[u64; 4]]) -> Asked {
+    let fetch = |&addresses| Fetch {
+        grid: 0,
+        addresses,
+        cell_bytes: 1,
+        planes: 1,
+        plane_bytes: 0,
+    };
+    Asked::Fetches(addresses.iter().map(fetch).collect())
 }

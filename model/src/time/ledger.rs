@@ -39,14 +39,19 @@ macro_rules! causes {
 causes! {
     /// The MAC array multiplies.
     Compute = "compute",
+    /// Operands are on their way through a systolic array, or accumulators on their way out of it.
+    ArrayFill = "array-fill",
     /// The MAC array waits for its next tile of weights from the weight SRAM.
     WeightLoad = "weight-load",
-    /// Weights come from outside: once at the start, and for each batch where they do not fit.
+    /// Weights come from outside: at the start, when a material's are not held, and for each batch
+    /// where they do not fit.
     WeightFill = "weight-fill",
     /// The next layer waits for requantisers or for the skip port.
     Requantize = "requantize",
     /// The next layer waits for the depth of the array's or the requantisers' pipeline.
     Dependency = "dependency",
+    /// A finished job waits for the filter.
+    Filter = "filter",
     /// A finished job waits for room in the output queue.
     OutputFull = "output-full",
     /// The next job waits for unpacking, interpolation, waves or level.
@@ -91,6 +96,15 @@ impl Ledger {
     #[must_use]
     pub fn cycles(&self) -> u64 {
         self.cycles.iter().sum()
+    }
+
+    /// What was charged since an earlier state of the same ledger.
+    pub(super) fn since(&self, earlier: &Ledger) -> Ledger {
+        let mut since = *self;
+        for (cycles, before) in since.cycles.iter_mut().zip(earlier.cycles) {
+            *cycles -= before;
+        }
+        since
     }
 
     /// Every cause with its cycles, in the order of [`Cause::ALL`].

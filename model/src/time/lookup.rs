@@ -1,71 +1,13 @@
-//! Lookup: the lines that a group's fetches touch, and the cycles of the tags for them.
+//! Lookup: the group in front of the tags of the latent cache.
 
+use super::assemble::Group;
 use super::cache::Tags;
-use super::cost::Cost;
+use super::choice::{CacheKind, Misses};
+use super::distinct::DistinctLines;
 use super::ledger::Cause;
 use super::memory::{Arrival, Memory};
 use super::unit::Unit;
-use crate::trace::Trace;
-
-/// The distinct lines of one fetch of a group, and how they spread over the banks.
-#[derive(Clone, Debug)]
-pub(super) struct Lines {
-    line_log2: u32,
-    lookups_per_bank: u32,
-    /// Lines of each bank.
-    banks: Vec<u32>,
-    /// The lines, in the order of first touch.
-    pub(super) lines: Vec<u64>,
-}
-
-impl Lines {
-    pub(super) fn new(unit: &Unit) -> Lines {
-        Lines {
-            line_log2: unit.line_bytes.trailing_zeros(),
-            lookups_per_bank: unit.lookups_per_bank,
-            banks: vec![0; unit.cache_banks as usize],
-            lines: Vec::new(),
-        }
-    }
-
-    /// Collects the lines of fetch `index` of texels `first..first + count`. The cycles of the tags:
-    /// those of the bank with most lines, at least one.
-    pub(super) fn collect(&mut self, trace: &Trace, first: u64, count: u64, index: usize) -> u64 {
-        self.lines.clear();
-        let mut before = None;
-        for texel in first..first + count {
-            let Some(fetch) = trace.texel(texel as usize).get(index) else {
-                continue;
-            };
-            // Neighbours mostly lie in the same cell.
-            if before == Some(fetch) {
-                continue;
-            }
-            before = Some(fetch);
-            for address in fetch.addresses {
-                let end = address + u64::from(fetch.cell_bytes.max(1)) - 1;
-                for line in address >> self.line_log2..=end >> self.line_log2 {
-                    if !self.lines.contains(&line) {
-                        self.lines.push(line);
-                    }
-                }
-            }
-        }
-        self.banks.fill(0);
-        let banks = self.banks.len() as u64;
-        for line in &self.lines {
-            self.banks[(line % banks) as usize] += 1;
-        }
-        let most = self.banks.iter().copied().max().unwrap_or(0);
-        u64::from(most.div_ceil(self.lookups_per_bank).max(1))
-    }
-}
-
-/// Fetches that a group makes: the program's, or more if the trace holds more.
-pub(super) fn fetches(cost: &Cost, trace: &Trace, first: u64, count: u64) -> u64 {
-    let traced = (first..first + count).map(|texel| trace.texel(texel as usize).len() as u64);
-    traced.fold(cost.lookup(), u64::max)
-}
+use super::watch::{Signal, Watch};
 
 /// Lookups of lines by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -79,160 +21,225 @@ pub(super) struct Outcomes {
 }
 
 /// A group in front of the tags.
-#[derive(Clone, Copy, Debug)]
-struct Group {
-    first: u64,
-    count: u64,
-    fetch: u64,
-    fetches: u64,
-    /// The next of the fetch's lines.
+#[derive(Debug)]
+struct Looked {
+    group: Group,
+    /// When it came.
+    since: u64,
+    fetch: usize,
+    /// The next line.
     line: usize,
     /// Start and end of the tags' cycles for the fetch.
     start: u64,
     end: u64,
-    /// A miss register is free from here on.
+    /// A miss register is free, or the lines under way are there, from here on.
     stalled_until: Option<u64>,
     /// The fetch has waited for a miss register.
     has_stalled: bool,
     /// The latest line so far.
     arrival: Arrival,
+    misses: u32,
+}
+
+/// What the cache holds.
+#[derive(Debug)]
+enum Held {
+    Sets(Tags),
+    Nothing,
+    Everything(DistinctLines),
 }
 
 /// The tags, the miss registers and the group in front of them.
 #[derive(Debug)]
-pub(super) struct Lookup<'a> {
-    cost: &'a Cost<'a>,
-    trace: &'a Trace,
-    tags: Tags,
+pub(super) struct Lookup {
+    held: Held,
+    is_blocking: bool,
+    line_bytes: u64,
     pub(super) memory: Memory,
-    lines: Lines,
     pub(super) outcomes: Outcomes,
-    /// Lines asked for, in order, where they are wanted.
-    pub(super) missed: Option<Vec<u64>>,
-    group: Option<Group>,
+    looked: Option<Looked>,
 }
 
-impl<'a> Lookup<'a> {
-    pub(super) fn new(cost: &'a Cost<'a>, trace: &'a Trace) -> Lookup<'a> {
+/// A group that has passed the tags.
+pub(super) struct Passed {
+    pub(super) group: Group,
+    /// Its latest line.
+    pub(super) arrival: Arrival,
+    /// When it came to the tags.
+    pub(super) since: u64,
+}
+
+impl Lookup {
+    pub(super) fn new(unit: &Unit) -> Lookup {
         Lookup {
-            cost,
-            trace,
-            tags: Tags::new(cost.unit.cache_sets, cost.unit.cache_ways),
-            memory: Memory::new(cost.unit),
-            lines: Lines::new(cost.unit),
+            held: match unit.cache {
+                CacheKind::Finite => Held::Sets(Tags::new(
+                    unit.cache_sets,
+                    unit.cache_ways,
+                    unit.replacement,
+                )),
+                CacheKind::None => Held::Nothing,
+                CacheKind::Infinite => Held::Everything(DistinctLines::default()),
+            },
+            is_blocking: unit.misses == Misses::Blocking,
+            line_bytes: u64::from(unit.line_bytes),
+            memory: Memory::new(unit),
             outcomes: Outcomes::default(),
-            missed: None,
-            group: None,
+            looked: None,
         }
     }
 
     /// Whether no group is in front of the tags.
     pub(super) fn is_idle(&self) -> bool {
-        self.group.is_none()
+        self.looked.is_none()
     }
 
     /// Takes a group.
-    pub(super) fn start(&mut self, now: u64, group: u64) {
-        let first = group * u64::from(self.cost.unit.coalesced_texels);
-        let count = self.cost.texels_of_group(group);
-        let fetches = fetches(self.cost, self.trace, first, count);
-        let end = now + self.lines.collect(self.trace, first, count, 0);
-        self.group = Some(Group {
-            first,
-            count,
+    pub(super) fn start(&mut self, now: u64, group: Group, watch: &mut impl Watch) {
+        let end = now + group.fetches.first().map_or(1, |fetch| fetch.tag_cycles);
+        self.looked = Some(Looked {
+            group,
+            since: now,
             fetch: 0,
-            fetches,
             line: 0,
             start: now,
             end,
             stalled_until: None,
             has_stalled: false,
-            arrival: Arrival::default(),
+            arrival: Arrival::THERE,
+            misses: 0,
         });
-        self.issue(now);
+        self.issue(now, watch);
     }
 
     /// Looks up the lines of the fetch from the next one on, until one finds no miss register.
-    fn issue(&mut self, now: u64) {
-        let Some(group) = self.group.as_mut() else {
+    fn issue(&mut self, now: u64, watch: &mut impl Watch) {
+        let Some(mut looked) = self.looked.take() else {
             return;
         };
-        group.stalled_until = None;
+        looked.stalled_until = None;
+        let before = self.memory.under_way();
         self.memory.retire(now);
-        while let Some(&line) = self.lines.lines.get(group.line) {
-            let is_held = self.tags.touch(line);
-            let arrival = match self.memory.pending(line) {
-                Some(arrival) => {
+        let end = looked
+            .group
+            .fetches
+            .get(looked.fetch)
+            .map_or(0, |fetch| fetch.end);
+        while looked.line < end {
+            let line = looked.group.lines[looked.line];
+            let arrival = match self.find(line) {
+                Some(arrival) if arrival.at > now => {
                     self.outcomes.merges += 1;
-                    Some(arrival)
+                    arrival
                 }
-                None if is_held => {
+                Some(arrival) => {
                     self.outcomes.hits += 1;
-                    None
+                    arrival
                 }
                 None => match self.memory.request(line, now) {
-                    Ok(arrival) => {
+                    Ok((is_fetched, arrival)) => {
                         self.outcomes.misses += 1;
-                        if let Some(missed) = self.missed.as_mut() {
-                            missed.push(line);
+                        looked.misses += 1;
+                        self.install(line, arrival);
+                        if is_fetched {
+                            watch.miss(now, line * self.line_bytes);
                         }
-                        Some(arrival)
+                        arrival
                     }
                     Err(free) => {
-                        group.stalled_until = Some(free);
-                        group.has_stalled = true;
-                        return;
+                        looked.stalled_until = Some(free);
+                        looked.has_stalled = true;
+                        break;
                     }
                 },
             };
-            if !is_held {
-                self.tags.install(line);
+            if arrival.at > looked.arrival.at {
+                looked.arrival = arrival;
             }
-            if let Some(arrival) = arrival
-                && arrival.at > group.arrival.at
-            {
-                group.arrival = arrival;
-            }
-            group.line += 1;
+            looked.line += 1;
         }
-        if group.has_stalled {
-            group.end = group.end.max(now + 1);
+        if looked.has_stalled && looked.stalled_until.is_none() {
+            looked.end = looked.end.max(now + 1);
+        }
+        self.looked = Some(looked);
+        let after = self.memory.under_way();
+        if after != before {
+            watch.level(Signal::MissRegisters, now, after as u64);
         }
     }
 
-    /// What happens at the start of cycle `now`. The group's latest line once its fetches are done.
-    pub(super) fn advance(&mut self, now: u64) -> Option<Arrival> {
-        let group = self.group.as_mut()?;
-        if let Some(free) = group.stalled_until {
+    /// When the line's data are there, if it need not be asked for. A line that was replaced while
+    /// it was under way, and is wanted again, joins the miss under way.
+    fn find(&mut self, line: u64) -> Option<Arrival> {
+        match &mut self.held {
+            Held::Sets(tags) => tags.touch(line).or_else(|| {
+                let arrival = self.memory.pending(line)?;
+                tags.install(line, arrival);
+                Some(arrival)
+            }),
+            Held::Nothing => None,
+            Held::Everything(lines) => lines
+                .has(line)
+                .then(|| self.memory.pending(line).unwrap_or(Arrival::THERE)),
+        }
+    }
+
+    fn install(&mut self, line: u64, arrival: Arrival) {
+        match &mut self.held {
+            Held::Sets(tags) => tags.install(line, arrival),
+            Held::Nothing => {}
+            Held::Everything(lines) => lines.add(line),
+        }
+    }
+
+    /// What happens at the start of cycle `now`. The group once its fetches are done.
+    pub(super) fn advance(&mut self, now: u64, watch: &mut impl Watch) -> Option<Passed> {
+        let looked = self.looked.as_mut()?;
+        if let Some(free) = looked.stalled_until {
             if free <= now {
-                self.issue(now);
+                self.issue(now, watch);
             }
             return None;
         }
-        if group.end > now {
+        if looked.end > now {
             return None;
         }
-        group.fetch += 1;
-        if group.fetch == group.fetches {
-            let arrival = group.arrival;
-            self.group = None;
-            return Some(arrival);
+        if looked.fetch + 1 < looked.group.fetches.len() {
+            looked.fetch += 1;
+            looked.start = now;
+            looked.has_stalled = false;
+            looked.end = now + looked.group.fetches[looked.fetch].tag_cycles;
+            self.issue(now, watch);
+            return None;
         }
-        let (first, count, fetch) = (group.first, group.count, group.fetch as usize);
-        group.line = 0;
-        group.start = now;
-        group.has_stalled = false;
-        group.end = now + self.lines.collect(self.trace, first, count, fetch);
-        self.issue(now);
-        None
+        if self.is_blocking
+            && looked.misses > 0
+            && let Some(last) = self.memory.last().filter(|&last| last > now)
+        {
+            // The tags take nothing more until the lines are there.
+            looked.stalled_until = Some(last);
+            return None;
+        }
+        let looked = self.looked.take()?;
+        let lines = looked.group.lines.len() as u32;
+        watch.lookup(looked.group.pixel, lines, looked.misses);
+        Some(Passed {
+            group: looked.group,
+            arrival: looked.arrival,
+            since: looked.since,
+        })
     }
 
     /// What cycle `now` is spent on, of the group in front of the tags.
     pub(super) fn cause(&self, now: u64) -> Option<Cause> {
-        let group = self.group.as_ref()?;
-        Some(if group.stalled_until.is_some() {
-            Cause::MshrFull
-        } else if now == group.start || group.has_stalled {
+        let looked = self.looked.as_ref()?;
+        Some(if looked.stalled_until.is_some() {
+            if self.is_blocking {
+                Cause::LatentMiss
+            } else {
+                Cause::MshrFull
+            }
+        } else if now == looked.start || looked.has_stalled {
             Cause::Lookup
         } else {
             Cause::BankConflict
@@ -241,10 +248,11 @@ impl<'a> Lookup<'a> {
 
     /// The cycles at which the cause may change or something may happen.
     pub(super) fn events(&self) -> [u64; 2] {
-        self.group
-            .map_or([0; 2], |group| match group.stalled_until {
+        self.looked
+            .as_ref()
+            .map_or([0; 2], |looked| match looked.stalled_until {
                 Some(free) => [free, free],
-                None => [group.start + 1, group.end],
+                None => [looked.start + 1, looked.end],
             })
     }
 }

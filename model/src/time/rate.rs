@@ -17,6 +17,11 @@ impl Rate {
         }
     }
 
+    /// Work in a cycle.
+    pub(super) fn per_cycle(&self) -> u64 {
+        self.per_cycle
+    }
+
     /// Takes work that is there from cycle `at` on, behind all earlier work. The cycle before which
     /// it is done: ⌈(max(position, at·rate) + work) / rate⌉.
     pub(super) fn serve(&mut self, at: u64, work: u64) -> u64 {

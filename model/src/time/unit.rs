@@ -501,6 +501,8 @@ impl Unit {
     pub fn with_ideal_memory(&self) -> Unit {
         let configuration = Configuration {
             hit_latency_cycles: 0,
+            level2_sets: 0,
+            weight_latency_cycles: 0,
             memory_latency_cycles: 0,
             memory_bytes_per_cycle: 1 << 20,
             lookups_per_bank: 1 << 12,
@@ -511,6 +513,21 @@ impl Unit {
         };
         Unit {
             name: format!("{}, ideal memory", self.name),
+            configuration,
+        }
+    }
+
+    /// The same unit with queues that hold more than any run puts in them.
+    #[must_use]
+    pub fn with_unbounded_queues(&self) -> Unit {
+        let configuration = Configuration {
+            request_queue_texels: 65_536,
+            corner_fifo_texels: 1_048_576,
+            output_queue_pixels: 1_048_576,
+            ..self.configuration
+        };
+        Unit {
+            name: format!("{}, endless queues", self.name),
             configuration,
         }
     }

@@ -8,6 +8,8 @@ use ntmu_isa::{Asset, Program};
 /// What the array multiplies: it decides how many passes a product takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Operands {
+    /// Weights of at most 4 bits, values of at most 8.
+    Narrow,
     /// Weights and values of at most 8 bits.
     Bytes,
     /// Weights of at most 8 bits, values of 9 to 16.
@@ -48,6 +50,10 @@ impl Dense {
 pub struct Work {
     /// Grid positions.
     pub positions: u32,
+    /// Multiply-add steps of an address generator; see [`Layout::address_steps`].
+    ///
+    /// [`Layout::address_steps`]: ntmu_isa::layout::Layout::address_steps
+    pub address_steps: u32,
     /// Fetches: four corners each.
     pub fetches: u32,
     /// Latents unpacked, of all corners.
@@ -86,7 +92,10 @@ pub fn work_of(asset: &Asset, program: &Program) -> Work {
     for instruction in program.instructions() {
         match *instruction {
             Instruction::Position { grid: _ } => work.positions += 1,
-            Instruction::Fetch { grid: _ } => work.fetches += 1,
+            Instruction::Fetch { grid: _ } => {
+                work.fetches += 1;
+                work.address_steps += 1;
+            }
             Instruction::Concat {
                 dst: _,
                 lane: _,
@@ -188,7 +197,13 @@ pub fn work_of(asset: &Asset, program: &Program) -> Work {
 fn operands(asset: &Asset, layer: usize) -> Operands {
     match (&asset.layers[layer].parameters, asset.input_format(layer)) {
         (Parameters::Half(_), _) => Operands::Half,
-        (Parameters::Integer(_), LaneFormat::Integer { bits: ..=8, .. }) => Operands::Bytes,
+        (Parameters::Integer(numbers), LaneFormat::Integer { bits: ..=8, .. }) => {
+            if numbers.weight_bits <= 4 {
+                Operands::Narrow
+            } else {
+                Operands::Bytes
+            }
+        }
         (Parameters::Integer(_), LaneFormat::Integer { .. } | LaneFormat::Half) => Operands::Wide,
     }
 }

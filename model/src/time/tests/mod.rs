@@ -4,21 +4,32 @@ mod operands;
 mod random;
 
 use super::fixture::{
-    Hidden, Kind, Sketch, addresses, hardware_sized, scan, thin, tiny, trace_of, unit,
+    Asked, Hidden, Kind, Sketch, addresses, hardware_sized, scan, simulate, thin, tiny, unit,
 };
-use super::*;
+use super::watch::Watch;
+use super::{Cause, Resource, Unit, work_of};
 use crate::request::Request;
+use crate::time;
 use crate::trace::Fetch;
 use ntmu_isa::activation::Activation;
 use ntmu_isa::layout::Layout;
 use ntmu_isa::rescale::Multiplier;
 use std::collections::BTreeSet;
 
+/// The addresses of all misses.
+#[derive(Default)]
+struct Missed(Vec<u64>);
+
+impl Watch for Missed {
+    fn miss(&mut self, _at: u64, address: u64) {
+        self.0.push(address);
+    }
+}
+
 #[test]
 fn two_texels_take_the_cycles_counted_by_hand() {
     let (asset, program, _) = scan(&tiny(), Layout::Linear);
-    let requests = Request::blocks(&asset.shape, 0).take(2);
-    let trace = trace_of(&asset, Layout::Linear, requests);
+    let trace = Asked::Texels(Request::blocks(&asset.shape, 0).take(2).collect());
     let unit = unit(&[
         ("requests_per_cycle", 1),
         ("coalesced_texels", 1),
@@ -121,30 +132,37 @@ fn a_cache_that_holds_everything_reads_every_line_once() {
         let unit = unit(&[("cache_sets", 1024), ("cache_ways", 8)]);
         let timing = simulate(&unit, &asset, &program, &trace);
         let line = u64::from(unit.line_bytes);
-        let cells = trace.texels().flatten().flat_map(|fetch| {
+        let material = trace.material(&asset, &program);
+        let mut fetches = Vec::new();
+        for demand in trace.demands() {
+            material
+                .addresses()
+                .fetches(&demand.places[0], &mut fetches);
+        }
+        let cells = fetches.iter().flat_map(|fetch| {
             let bytes = u64::from(fetch.cell_bytes);
-            fetch
-                .addresses
-                .into_iter()
-                .flat_map(move |at| at / line..=(at + bytes - 1) / line)
+            let touched = move |at| at / line..=(at + bytes - 1) / line;
+            fetch.addresses.into_iter().flat_map(touched)
         });
         let distinct: BTreeSet<u64> = cells.collect();
         let count = distinct.len() as u64;
         assert_eq!((timing.misses, timing.latent_bytes), (count, count * line));
-        // The same lines as a trace for a DRAM simulator: each once.
-        let mut text: Vec<String> = ramulator_trace(&unit, &asset, &program, &trace).collect();
-        text.sort();
-        let expected = distinct.iter().map(|at| format!("LD {:#x}", at * line));
-        let mut expected: Vec<String> = expected.collect();
-        expected.sort();
-        assert_eq!(text, expected);
+        assert_eq!(timing.distinct_lines, count);
+        // Whoever watches sees the same lines, each once.
+        let mut missed = Missed::default();
+        let materials = [material];
+        let run = time::simulate(&unit, &materials, &mut trace.demands(), &mut missed);
+        assert_eq!(run, Ok(timing));
+        missed.0.sort_unstable();
+        let starts: Vec<u64> = distinct.iter().map(|at| at * line).collect();
+        assert_eq!(missed.0, starts);
     }
 }
 
 #[test]
 fn a_line_is_looked_up_once_for_the_texels_of_a_group_and_a_cell_may_lie_in_two() {
     let (asset, program, _) = scan(&tiny(), Layout::Linear);
-    let lookups = |coalesced, trace: &Trace| {
+    let lookups = |coalesced, trace: &Asked| {
         let unit = unit(&[("coalesced_texels", coalesced), ("cache_banks", 4)]);
         let timing = simulate(&unit, &asset, &program, trace);
         (timing.lookups, timing.misses)
@@ -155,22 +173,24 @@ fn a_line_is_looked_up_once_for_the_texels_of_a_group_and_a_cell_may_lie_in_two(
         [1, 2, 4].map(|n| lookups(n, &trace)),
         [(5, 4), (5, 4), (4, 4)]
     );
-    let mut straddling = Trace::new();
-    straddling.fetch(Fetch {
-        grid: 0,
-        addresses: [60, 60, 64, 0],
-        cell_bytes: 8,
-        planes: 1,
-        plane_bytes: 0,
-    });
-    straddling.end_texel();
-    assert_eq!(lookups(1, &straddling), (2, 2));
+    let fetch = |planes| {
+        Asked::Fetches(vec![Fetch {
+            grid: 0,
+            addresses: [60, 60, 64, 0],
+            cell_bytes: 8,
+            planes,
+            plane_bytes: 256,
+        }])
+    };
+    assert_eq!(lookups(1, &fetch(1)), (2, 2));
+    // Two lines in each of three planes.
+    assert_eq!(lookups(1, &fetch(3)), (6, 6));
 }
 
 #[test]
 fn corners_in_one_bank_are_looked_up_one_after_the_other() {
     let (asset, program, _) = scan(&tiny(), Layout::Linear);
-    let run = |trace: &Trace, banks, lookups| {
+    let run = |trace: &Asked, banks, lookups| {
         let ideal = unit(&[("coalesced_texels", 1), ("batch_texels", 1)]).with_ideal_memory();
         let changes = [("cache_banks", banks), ("lookups_per_bank", lookups)];
         let mut configuration = *ideal.configuration();
@@ -297,7 +317,7 @@ fn every_resource_is_the_bottleneck_of_the_unit_that_is_short_of_it() {
     }
     for (resource, changes) in [
         (
-            Resource::WeightFill,
+            Resource::WeightStream,
             vec![("weight_sram_bytes", 0), ("weight_fill_bytes_per_cycle", 1)],
         ),
         (Resource::Memory, vec![("memory_bytes_per_cycle", 1)]),
@@ -318,10 +338,7 @@ fn weights_that_do_not_fit_are_streamed_for_each_batch() {
     let fits = simulate(&unit(&[]), &asset, &program, &trace);
     assert_eq!(fits.weight_bytes, whole);
     let none = simulate(&unit(&[("weight_sram_bytes", 0)]), &asset, &program, &trace);
-    assert_eq!(
-        none.weight_bytes,
-        whole * trace.texel_count().div_ceil(16) as u64
-    );
+    assert_eq!(none.weight_bytes, whole * trace.count().div_ceil(16) as u64);
     assert!(none.ledger.of(Cause::WeightFill) > fits.ledger.of(Cause::WeightFill));
 }
 
@@ -353,7 +370,12 @@ fn a_deep_corner_fifo_hides_the_latency_of_memory() {
 #[test]
 fn no_texels_take_no_cycles() {
     let (asset, program, _) = scan(&tiny(), Layout::Linear);
-    let timing = simulate(&Unit::console(), &asset, &program, &Trace::new());
+    let timing = simulate(
+        &Unit::console(),
+        &asset,
+        &program,
+        &Asked::Texels(Vec::new()),
+    );
     assert_eq!(
         (
             timing.cycles,

@@ -1,7 +1,7 @@
 //! Claims about layers of other operands than bytes.
 
-use crate::time::fixture::{Hidden, Kind, Sketch, scan, thin, tiny, unit};
-use crate::time::{Cause, simulate, work_of};
+use crate::time::fixture::{Hidden, Kind, Sketch, scan, simulate, thin, tiny, unit};
+use crate::time::{Cause, work_of};
 use ntmu_isa::activation::Activation;
 use ntmu_isa::layout::Layout;
 use ntmu_isa::rescale::Multiplier;
@@ -20,7 +20,7 @@ fn operands_wider_than_bytes_pass_the_array_as_often_as_the_unit_says() {
     let compute = |sketch: &Sketch, changes: &[(&str, u32)]| {
         let (asset, program, trace) = scan(sketch, Layout::Tiled);
         let timing = simulate(&unit(changes), &asset, &program, &trace);
-        (timing.ledger.of(Cause::Compute), trace.texel_count() as u64)
+        (timing.ledger.of(Cause::Compute), trace.count() as u64)
     };
     // 41 inputs are three columns of tiles, 16 and 16 one each, 5 in all for each texel.
     let [bytes, wide] = [8, 9].map(|bits| layers(Kind::Integer(bits), Kind::Integer(8)));
@@ -50,7 +50,7 @@ fn a_tile_of_halves_takes_twice_as_long_to_load() {
         let (asset, program, trace) = scan(&sketch, Layout::Tiled);
         let unit = unit(&[("tile_load_cycles", 50), ("half_passes", 1)]);
         let timing = simulate(&unit, &asset, &program, &trace);
-        let batches = trace.texel_count() as u64 / 16;
+        let batches = trace.count() as u64 / 16;
         timing.ledger.of(Cause::WeightLoad) / batches
     };
     // Passes of 16 cycles; three tiles of the first layer, one of the last, which are bytes.

@@ -1,10 +1,9 @@
 //! Claims about random units, programs and requests.
 
 use crate::request::Request;
-use crate::time::fixture::{Hidden, Kind, Sketch, asset, trace_of};
+use crate::time::Unit;
+use crate::time::fixture::{Asked, Hidden, Kind, Sketch, asset, simulate, simulate_with_stride};
 use crate::time::unit::{FIELDS, Range, Value};
-use crate::time::{Unit, simulate, simulate_with_stride};
-use crate::trace::Trace;
 use ntmu_isa::activation::Activation;
 use ntmu_isa::layout::Layout;
 use ntmu_isa::rescale::Multiplier;
@@ -119,7 +118,7 @@ fn any_sketch() -> impl Strategy<Value = Sketch> {
 }
 
 /// A run of a random program for some texels: blocks in order, or anything anywhere.
-fn any_run() -> impl Strategy<Value = (Asset, Program, Trace)> {
+fn any_run() -> impl Strategy<Value = (Asset, Program, Asked)> {
     let texel = (0..7_u8, any::<u32>(), any::<u32>());
     let scattered = prop::collection::vec(texel, 1..120).prop_map(Some);
     let order = prop_oneof![Just(None), scattered];
@@ -142,7 +141,7 @@ fn any_run() -> impl Strategy<Value = (Asset, Program, Trace)> {
                     texels.into_iter().map(request).collect()
                 }
             };
-            let trace = trace_of(&asset, layout, requests.into_iter());
+            let trace = Asked::Texels(requests);
             let program = Program::compile(&asset, layout);
             (asset, program, trace)
         })
@@ -157,13 +156,14 @@ proptest! {
         let timing = simulate(&unit, &asset, &program, &trace);
         prop_assert!(timing.cycles >= timing.closed_form.cycles, "{:?}", timing);
         prop_assert_eq!(timing.ledger.entries().map(|entry| entry.1).sum::<u64>(), timing.cycles);
-        prop_assert_eq!(timing.texels as usize, trace.texel_count());
+        prop_assert_eq!(timing.pixels as usize, trace.count());
     }
 
     #[test]
     fn a_run_behind_an_ideal_memory_takes_exactly_its_closed_form(unit in any_unit(), run in any_run()) {
         let (asset, program, trace) = run;
-        let timing = simulate(&unit.with_ideal_memory(), &asset, &program, &trace);
+        let unit = unit.with_ideal_memory().with_unbounded_queues();
+        let timing = simulate(&unit, &asset, &program, &trace);
         prop_assert_eq!(timing.cycles, timing.closed_form.cycles);
     }
 
