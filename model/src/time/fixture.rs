@@ -188,9 +188,9 @@ pub(super) fn trace_of(
             trace.fetch(Fetch {
                 grid: index as u8,
                 addresses: cells.map(|(x, y)| layout.address(shape, index, x, y)),
-                cell_bytes: Layout::cell_bytes(shape, index) as u32,
-                planes: 1,
-                plane_bytes: 0,
+                cell_bytes: layout.cell_bytes(shape, index) as u32,
+                planes: layout.planes(shape, index),
+                plane_bytes: layout.plane_bytes(shape, index),
             });
         }
         trace.end_texel();
