@@ -16,7 +16,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
         _ => (3, 5, 0),
     };
     let asset = ntmu::built_in::asset()?;
-    let program = Program::compile(&asset, Layout::Tiled);
+    let program = Program::compile(&asset, Layout::TILED);
     let decoder = Decoder::new(&asset, &program);
 
     // All codes of the block at once …

@@ -21,7 +21,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn show(asset: &Asset, (x, y, mip): (u32, u32, u8)) -> Result<(), Box<dyn Error>> {
-    let program = Program::compile(asset, Layout::Linear);
+    let program = Program::compile(asset, Layout::LINEAR);
     let decoder = Decoder::new(asset, &program);
     let codes = decoder.texel(Request::new(&asset.shape, x, y, mip)?, &mut ());
     for map in &asset.metadata.maps {

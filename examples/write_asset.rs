@@ -18,7 +18,7 @@ use std::error::Error;
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let asset = asset()?;
-    let program = Program::compile(&asset, Layout::Linear);
+    let program = Program::compile(&asset, Layout::LINEAR);
     println!("{}", Decoder::new(&asset, &program).mip(0));
     // As an example its first argument is a file; as a part of the tests it has none of its own.
     if let Some(path) = std::env::args()

@@ -10,7 +10,7 @@
 //! use ntmu::model::{Request, exec::Decoder};
 //!
 //! let asset = ntmu::built_in::asset()?;
-//! let program = Program::compile(&asset, Layout::Linear);
+//! let program = Program::compile(&asset, Layout::LINEAR);
 //! let request = Request::new(&asset.shape, 10, 20, 0)?;
 //! let codes = Decoder::new(&asset, &program).texel(request, &mut ());
 //! assert_eq!(codes.len(), 9);

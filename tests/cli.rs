@@ -158,7 +158,7 @@ fn a_printed_program_is_accepted_again() {
     let folder = folder();
     let asset = asset_in(folder.path());
     let asset = asset.to_str().unwrap();
-    let printed = ntmu(&["program", asset, "--layout", "tiled"], folder.path());
+    let printed = ntmu(&["program", asset, "--layout", "tiles-4"], folder.path());
     std::fs::write(folder.path().join("wall.asm"), &printed.stdout).unwrap();
     let again = ntmu(&["program", asset, "--check", "wall.asm"], folder.path());
     assert_eq!(printed.stdout, again.stdout);

@@ -38,7 +38,7 @@ fn places(asset: &Asset) -> Vec<Place> {
 
 /// All mips whole, by `mip` and by `bands`, single texels and blocks along their diagonal, and places.
 fn assert_equal(asset: &Asset, what: &str) {
-    let program = Program::compile(asset, Layout::Linear);
+    let program = Program::compile(asset, Layout::LINEAR);
     let reference = Decoder::new(asset, &program);
     let places = places(asset);
     let expected_places = Decode::places(&reference, &places);
@@ -237,7 +237,7 @@ fn layers_of_every_pair_of_kinds_follow_each_other_like_in_the_reference() {
 fn the_synthesizer_alone_gives_the_codes_of_the_inputs_that_the_reference_saw() {
     for seed in 0..60 {
         let asset = synthetic::asset(&synthetic::arbitrary_spec(seed), seed).unwrap();
-        let program = Program::compile(&asset, Layout::Linear);
+        let program = Program::compile(&asset, Layout::LINEAR);
         let reference = Decoder::new(&asset, &program);
         let (mut inputs, mut expected) = (Vec::new(), Vec::new());
         for request in Request::blocks(&asset.shape, 0).take(100) {

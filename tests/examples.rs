@@ -22,7 +22,7 @@ fn a_block_is_decoded_with_its_taps() {
 fn an_asset_written_by_hand_shows_its_grid() {
     write_asset::main().unwrap();
     let asset = write_asset::asset().unwrap();
-    let program = ntmu::isa::Program::compile(&asset, ntmu::isa::layout::Layout::Linear);
+    let program = ntmu::isa::Program::compile(&asset, ntmu::isa::layout::Layout::LINEAR);
     let codes = ntmu::model::exec::Decoder::new(&asset, &program).mip(0);
     // Code 0 stands for black and code 15 for white; the first row of cells rises, the second
     // falls.

@@ -20,7 +20,7 @@ proptest! {
         let mip = mip % asset.shape.mip_count;
         let (width, height) = asset.shape.mip_size(mip);
         let request = Request::new(&asset.shape, x % width, y % height, mip).unwrap();
-        let program = Program::compile(&asset, Layout::Tiled);
+        let program = Program::compile(&asset, Layout::TILED);
         let found = Claims::new(&asset, &program).texel(request);
         prop_assert!(found.holds(), "{found:#?}");
     }

@@ -44,7 +44,7 @@ fn centres(asset: &Asset) -> Vec<(f32, f32, Request)> {
 #[test]
 fn a_sample_at_a_texels_centre_is_the_texel_by_every_filter_and_order() {
     let asset = asset(1);
-    let program = Program::compile(&asset, Layout::Tiled);
+    let program = Program::compile(&asset, Layout::TILED);
     let decoder = Decoder::new(&asset, &program);
     let base = Sampler::default();
     let samplers = [
@@ -87,7 +87,7 @@ fn samples_of_every_named_profile_lie_within_the_bound_of_their_roundings() {
         };
         spec.shape.outputs = OutputFormat::ALL.to_vec();
         let asset = synthetic::asset(&spec, seed as u64).unwrap();
-        let program = Program::compile(&asset, Layout::Tiled);
+        let program = Program::compile(&asset, Layout::TILED);
         let decoder = Decoder::new(&asset, &program);
         for address in [
             Address::Wrap,
@@ -155,7 +155,7 @@ fn samples_of_every_named_profile_lie_within_the_bound_of_their_roundings() {
 #[test]
 fn a_trace_of_a_samples_reads_has_its_decodes() {
     let asset = asset(3);
-    let program = Program::compile(&asset, Layout::Tiled);
+    let program = Program::compile(&asset, Layout::TILED);
     let decoder = Decoder::new(&asset, &program);
     for order in [Order::DecodeThenFilter, Order::FilterThenDecode] {
         let sampler = Sampler {
@@ -185,7 +185,7 @@ fn a_constant_set_stays_constant_in_both_orders() {
         grid.fill(3);
     }
     let asset = Asset::new(parts).unwrap();
-    let program = Program::compile(&asset, Layout::Tiled);
+    let program = Program::compile(&asset, Layout::TILED);
     let decoder = Decoder::new(&asset, &program);
     let colour = decoder.texel(Request::new(&asset.shape, 0, 0, 0).unwrap(), &mut ());
     for order in [Order::DecodeThenFilter, Order::FilterThenDecode] {

@@ -253,7 +253,7 @@ impl Findings {
 /// a texel of fifty thousand multiplications, and more in fp16.
 #[must_use]
 pub fn findings(asset: &Asset, requests: &[Request]) -> Findings {
-    let program = Program::compile(asset, Layout::Linear);
+    let program = Program::compile(asset, Layout::LINEAR);
     let claims = Claims::new(asset, &program);
     let texels: Vec<(Texel, Vec<f64>, RealTaps)> = requests
         .par_iter()

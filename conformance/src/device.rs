@@ -112,7 +112,7 @@ impl Device for ModelDevice {
         asset: &Asset,
         requests: &[Request],
     ) -> Result<Vec<Vec<i32>>, DeviceError> {
-        let program = Program::compile(asset, Layout::Linear);
+        let program = Program::compile(asset, Layout::LINEAR);
         let decoder = Decoder::new(asset, &program);
         Ok(requests
             .iter()
@@ -121,7 +121,7 @@ impl Device for ModelDevice {
     }
 
     fn taps(&mut self, asset: &Asset, request: Request) -> Result<Taps, DeviceError> {
-        let program = Program::compile(asset, Layout::Linear);
+        let program = Program::compile(asset, Layout::LINEAR);
         let taps = Decoder::new(asset, &program).taps(request);
         Ok(stage::from_model(&taps))
     }

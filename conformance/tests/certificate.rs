@@ -74,7 +74,7 @@ fn no_sum_and_no_output_of_four_hundred_assets_leaves_its_certificate() {
         // The certificate speaks of the weights: it is the same for other latents.
         let asset = extreme_latents(&asset, seed);
         assert_eq!(Certificate::of(&asset).layers, certificate.layers);
-        let program = Program::compile(&asset, Layout::Linear);
+        let program = Program::compile(&asset, Layout::LINEAR);
         let decoder = Decoder::new(&asset, &program);
         let chain = (0..asset.shape.mip_count).flat_map(|mip| Request::blocks(&asset.shape, mip));
         for request in chain.step_by(37) {
@@ -104,7 +104,7 @@ fn with_accumulator(asset: &Asset, bits: u8, overflow: Overflow) -> Option<Asset
 }
 
 fn first_sums(asset: &Asset, request: Request) -> Vec<i32> {
-    let program = Program::compile(asset, Layout::Linear);
+    let program = Program::compile(asset, Layout::LINEAR);
     let taps = Decoder::new(asset, &program).taps(request);
     taps.layers[0].accumulators.clone()
 }
@@ -138,7 +138,7 @@ fn a_witness_needs_every_bit_of_the_certified_width_and_no_more() {
         let reached = Range::point(witness.extreme.sum);
         assert!(sums.sums.holds(reached) && reached.bits() == sums.sums.bits());
         // The texel gives the input that the witness names.
-        let program = Program::compile(&witness.asset, Layout::Linear);
+        let program = Program::compile(&witness.asset, Layout::LINEAR);
         let taps = Decoder::new(&witness.asset, &program).taps(request);
         let inputs: Vec<i64> = taps.inputs.iter().map(|&x| i64::from(x)).collect();
         assert_eq!(inputs, witness.extreme.input);
@@ -269,7 +269,7 @@ fn a_scale_too_large_for_its_sums_breaks_the_precondition_and_a_usual_one_does_n
 /// Every prefix and the whole of every row's sum, of every texel.
 fn observed(asset: &Asset, ranges: &mut [Option<(Range, Range)>]) {
     let p = asset.layers[0].integer().unwrap();
-    let program = Program::compile(asset, Layout::Linear);
+    let program = Program::compile(asset, Layout::LINEAR);
     let decoder = Decoder::new(asset, &program);
     let chain = (0..asset.shape.mip_count).flat_map(|mip| Request::blocks(&asset.shape, mip));
     for request in chain {

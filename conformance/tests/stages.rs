@@ -43,7 +43,7 @@ fn check(claims: &Claims<'_>, request: Request) -> bool {
 }
 
 fn check_all(asset: &Asset, requests: impl Iterator<Item = Request>) -> (usize, usize) {
-    let program = Program::compile(asset, Layout::Linear);
+    let program = Program::compile(asset, Layout::LINEAR);
     let claims = Claims::new(asset, &program);
     requests.fold((0, 0), |(texels, overflowing), request| {
         (

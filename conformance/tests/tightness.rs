@@ -74,7 +74,7 @@ fn largest(
     asset: &Asset,
     of: impl Fn(&Oracle<'_>, Request, &ntmu_model::exec::Taps) -> f64,
 ) -> f64 {
-    let program = Program::compile(asset, Layout::Linear);
+    let program = Program::compile(asset, Layout::LINEAR);
     let (decoder, oracle) = (Decoder::new(asset, &program), Oracle::new(asset));
     let mips = 0..asset.shape.mip_count;
     let requests = mips.flat_map(|mip| Request::blocks(&asset.shape, mip));
@@ -183,7 +183,7 @@ fn without_hidden_layers_the_end_to_end_bound_is_nearly_reached() {
             &worst::texel(oracle, &real),
         )
     });
-    let program = Program::compile(&asset, Layout::Linear);
+    let program = Program::compile(&asset, Layout::LINEAR);
     let (decoder, oracle) = (Decoder::new(&asset, &program), Oracle::new(&asset));
     for request in Request::blocks(&asset.shape, 0) {
         histogram.record(

@@ -1,7 +1,7 @@
 //! Assembly: a program as text, both ways.
 //!
 //! ```text
-//! .layout tiled
+//! .layout tiles-4
 //! position g0
 //! concat   v0, 0, g0          ; mnemonic, then operands in the order of the table
 //! end
@@ -10,7 +10,7 @@
 //! A line holds at most one instruction or directive; `;` starts a comment.
 
 use crate::instruction::{Instruction, OperandKind, TABLE};
-use crate::layout::Layout;
+use crate::layout::{Layout, LayoutError};
 use std::fmt;
 use std::fmt::Write as _;
 
@@ -55,7 +55,7 @@ pub fn disassemble(instruction: &Instruction) -> String {
 /// A program's layout and instructions as text.
 #[must_use]
 pub fn print(layout: Layout, instructions: &[Instruction]) -> String {
-    let mut text = format!(".layout {}\n", layout.name());
+    let mut text = format!(".layout {layout}\n");
     for instruction in instructions {
         let _ = writeln!(text, "{}", disassemble(instruction));
     }
@@ -67,7 +67,7 @@ pub fn print(layout: Layout, instructions: &[Instruction]) -> String {
 /// # Errors
 /// The first line that is neither empty, a directive nor an instruction of the table.
 pub fn assemble(text: &str) -> Result<(Layout, Vec<Instruction>), AssemblyError> {
-    let mut layout = Layout::Linear;
+    let mut layout = Layout::LINEAR;
     let mut instructions = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let code = line.split(';').next().unwrap_or_default().trim();
@@ -82,11 +82,9 @@ pub fn assemble(text: &str) -> Result<(Layout, Vec<Instruction>), AssemblyError>
         let (mnemonic, rest) = code.split_once(char::is_whitespace).unwrap_or((code, ""));
         let rest = rest.trim();
         if mnemonic == ".layout" {
-            let names: Vec<&str> = Layout::ALL.iter().map(|l| l.name()).collect();
-            layout = Layout::ALL
-                .into_iter()
-                .find(|l| l.name() == rest)
-                .ok_or_else(|| error(rest, names.join(", ")))?;
+            layout = rest
+                .parse()
+                .map_err(|refusal: LayoutError| error(rest, refusal.allowed()))?;
             continue;
         }
         let row = TABLE
@@ -171,8 +169,8 @@ mod tests {
             for pick in [Operand::max as fn(&Operand) -> u16, |_| 0, |o| o.max() / 2] {
                 let operands: Vec<u16> = row.operands.iter().map(pick).collect();
                 let instruction = Instruction::from_operands(row.opcode, &operands).unwrap();
-                let text = print(Layout::Tiled, &[instruction]);
-                assert_eq!(assemble(&text), Ok((Layout::Tiled, vec![instruction])));
+                let text = print(Layout::TILED, &[instruction]);
+                assert_eq!(assemble(&text), Ok((Layout::TILED, vec![instruction])));
             }
         }
     }
@@ -187,7 +185,8 @@ mod tests {
             refusal("dense l0, v0").allowed,
             "4 operands: layer, src, inputs, outputs"
         );
-        assert_eq!(refusal(".layout spiral").allowed, "linear, tiled");
+        let unknown = "spiral".parse::<Layout>().unwrap_err();
+        assert_eq!(refusal(".layout spiral").allowed, unknown.allowed());
         assert_eq!(refusal("position g+1").allowed, "grid: g0 to g1");
     }
 }

@@ -52,7 +52,7 @@ fn saw_writes_the_fraction_of_the_period_and_zero_fills_the_rest() {
     let layer = integer(&[&[0; 14]], &[0], power(0), Activation::Identity);
     let zero = vec![127_u8];
     let asset = asset_of(shape, [zero.clone(), zero], NORMATIVE, vec![layer]);
-    let program = Program::compile(&asset, Layout::Linear);
+    let program = Program::compile(&asset, Layout::LINEAR);
     let decoder = Decoder::new(&asset, &program);
     for (x, y) in (0..8).flat_map(|x| (0..8).map(move |y| (x, y))) {
         let request = Request::new(&asset.shape, x, y, 0).unwrap();
@@ -341,7 +341,7 @@ fn a_rescale_follows_what_was_done_and_not_what_the_layer_says() {
         vec![gated, looked_up, last],
         OutputFormat::Unorm8,
     );
-    let whole = Program::compile(&asset, Layout::Linear);
+    let whole = Program::compile(&asset, Layout::LINEAR);
     let plain = whole.instructions().iter().copied();
     let plain = plain.filter(|instruction| {
         !matches!(
@@ -349,7 +349,7 @@ fn a_rescale_follows_what_was_done_and_not_what_the_layer_says() {
             Instruction::Gate { .. } | Instruction::Table { .. }
         )
     });
-    let plain = Program::link(&asset, Layout::Linear, plain.collect()).unwrap();
+    let plain = Program::link(&asset, Layout::LINEAR, plain.collect()).unwrap();
     let request = Request::new(&asset.shape, 0, 0, 0).unwrap();
     let outputs = |program| {
         let taps = Decoder::new(&asset, program).taps(request);

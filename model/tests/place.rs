@@ -89,7 +89,7 @@ fn the_centre_of_every_texel_decodes_as_the_texel_while_four_bits_are_exact() {
             };
             for snap in CornerSnap::ALL {
                 let asset = textured([3, 2], AddressMode::Mirror, snap, profile);
-                let program = Program::compile(&asset, Layout::Linear);
+                let program = Program::compile(&asset, Layout::LINEAR);
                 let decoder = Decoder::new(&asset, &program);
                 for request in (0..=5).flat_map(|mip| Request::blocks(&asset.shape, mip)) {
                     let texel = decoder.texel(request, &mut ());
@@ -112,7 +112,7 @@ fn each_axis_of_a_place_is_its_position_in_each_grid() {
         .flat_map(|mode| CornerSnap::ALL.map(|snap| (mode, snap)))
     {
         let asset = textured([3, 1], mode, snap, Profile::NORMATIVE);
-        let program = Program::compile(&asset, Layout::Linear);
+        let program = Program::compile(&asset, Layout::LINEAR);
         let decoder = Decoder::new(&asset, &program);
         let mut random = Random(5);
         for _ in 0..500 {
@@ -143,7 +143,7 @@ fn a_mip_and_its_blocks_are_their_texels() {
         CornerSnap::Cell,
         Profile::NORMATIVE,
     );
-    let program = Program::compile(&asset, Layout::Linear);
+    let program = Program::compile(&asset, Layout::LINEAR);
     let decoder = Decoder::new(&asset, &program);
     for mip in 0..7 {
         let codes = decoder.mip(mip);
@@ -171,7 +171,7 @@ fn a_finer_phase_differs_where_four_bits_are_not_enough() {
             ..Profile::NORMATIVE
         };
         let asset = textured([1, 1], AddressMode::Wrap, CornerSnap::Stride, profile);
-        let program = Program::compile(&asset, Layout::Linear);
+        let program = Program::compile(&asset, Layout::LINEAR);
         let request = Request::new(&asset.shape, 0, 0, 5).unwrap();
         let found = inputs(&Decoder::new(&asset, &program), &Place::of(request));
         (found.corners[0].x.phase, found.corners[0].x.phase_bits)
@@ -196,7 +196,7 @@ fn between_two_cells_the_input_is_the_nearest_to_the_line() {
         Profile::NORMATIVE,
         vec![layer],
     );
-    let program = Program::compile(&asset, Layout::Linear);
+    let program = Program::compile(&asset, Layout::LINEAR);
     let decoder = Decoder::new(&asset, &program);
     for x in -(4 << 8)..=20 << 8 {
         let found = inputs(&decoder, &at(&asset.shape, x, 9 << 7, 8, 0));
@@ -219,7 +219,7 @@ fn a_wrapped_grid_repeats_with_the_mip_and_so_do_its_waves() {
         CornerSnap::Stride,
         Profile::NORMATIVE,
     );
-    let program = Program::compile(&asset, Layout::Tiled);
+    let program = Program::compile(&asset, Layout::TILED);
     let decoder = Decoder::new(&asset, &program);
     for (bits, mip) in [(1, 0), (4, 0), (8, 1), (12, 2), (3, 3)] {
         let (width, height) = asset.shape.mip_size(mip);
@@ -243,7 +243,7 @@ fn a_mirrored_grid_is_reflected_at_its_edges_and_a_clamped_one_ends_there() {
         CornerSnap::Cell,
         Profile::NORMATIVE,
     );
-    let program = Program::compile(&mirrored, Layout::Linear);
+    let program = Program::compile(&mirrored, Layout::LINEAR);
     let decoder = Decoder::new(&mirrored, &program);
     // In 1/2^5 texels a fraction of a cell of 8 texels is exact in 8 bits, on both sides.
     for x in 0..64 << 5 {
@@ -259,7 +259,7 @@ fn a_mirrored_grid_is_reflected_at_its_edges_and_a_clamped_one_ends_there() {
         CornerSnap::Cell,
         Profile::NORMATIVE,
     );
-    let program = Program::compile(&clamped, Layout::Linear);
+    let program = Program::compile(&clamped, Layout::LINEAR);
     let decoder = Decoder::new(&clamped, &program);
     let lerp = |x, y| inputs(&decoder, &at(&clamped.shape, x, y, 5, 0)).lerp;
     for step in 0..200 {
@@ -279,7 +279,7 @@ fn the_level_is_the_place_s_and_not_the_mip_s() {
         CornerSnap::Cell,
         Profile::NORMATIVE,
     );
-    let program = Program::compile(&asset, Layout::Linear);
+    let program = Program::compile(&asset, Layout::LINEAR);
     let decoder = Decoder::new(&asset, &program);
     for (mip, lod) in (0..7).flat_map(|mip| (0..=6 << 8).map(move |lod| (mip, lod))) {
         let place = Place::new(&asset.shape, [5, 9], 3, mip, lod, 8).unwrap();
@@ -352,7 +352,7 @@ fn places_at_the_ends_of_the_range_decode_to_channel_codes() {
         .flat_map(|mode| CornerSnap::ALL.map(|snap| (mode, snap)))
     {
         let asset = textured([1, 3], mode, snap, Profile::NORMATIVE);
-        let program = Program::compile(&asset, Layout::Tiled);
+        let program = Program::compile(&asset, Layout::TILED);
         let decoder = Decoder::new(&asset, &program);
         for (bits, mip) in (1..=12).flat_map(|bits| (0..7).map(move |mip| (bits, mip))) {
             let limit = 1_i64 << (16 + bits);
@@ -377,7 +377,7 @@ fn the_trace_of_texels_is_that_of_their_centres_and_places_touch_their_own_cells
         CornerSnap::Cell,
         Profile::NORMATIVE,
     );
-    let program = Program::compile(&asset, Layout::Tiled);
+    let program = Program::compile(&asset, Layout::TILED);
     let decoder = Decoder::new(&asset, &program);
     let requests = || (0..7).flat_map(|mip| Request::blocks(&asset.shape, mip));
     let texels = decoder.trace(requests());
@@ -387,7 +387,7 @@ fn the_trace_of_texels_is_that_of_their_centres_and_places_touch_their_own_cells
     let corners = inputs(&decoder, &place).corners;
     for (fetch, corners) in trace.texel(0).iter().zip(corners) {
         let grid = usize::from(fetch.grid);
-        let address = |(x, y)| Layout::Tiled.address(&asset.shape, grid, x, y);
+        let address = |(x, y)| Layout::TILED.address(&asset.shape, grid, x, y);
         assert_eq!(fetch.addresses, corners.cells().map(address));
     }
 }

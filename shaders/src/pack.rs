@@ -201,7 +201,7 @@ fn header(asset: &Asset, taps: &TapLayout) -> Vec<u32> {
             u32::from(grid.channels),
             u32::from(grid.format.bits()),
             u32::from(grid.scale_log2),
-            Layout::cell_bytes(shape, index) as u32,
+            Layout::LINEAR.cell_bytes(shape, index) as u32,
             taps.grids[index].start,
             0,
         ]);
@@ -213,7 +213,7 @@ fn header(asset: &Asset, taps: &TapLayout) -> Vec<u32> {
 
 /// Bytes of a grid's packed codes, padded to a word.
 pub(crate) fn grid_bytes(asset: &Asset, grid: usize) -> u64 {
-    Layout::Linear
+    Layout::LINEAR
         .grid_bytes(&asset.shape, grid)
         .next_multiple_of(4)
 }
@@ -223,7 +223,7 @@ pub(crate) fn grid_bytes(asset: &Asset, grid: usize) -> u64 {
 fn grid_codes(asset: &Asset, grid: usize) -> Vec<u8> {
     let shape = asset.shape.grids[grid];
     let bits = usize::from(shape.format.bits());
-    let cell_bytes = Layout::cell_bytes(&asset.shape, grid) as usize;
+    let cell_bytes = Layout::LINEAR.cell_bytes(&asset.shape, grid) as usize;
     let mut bytes = Vec::with_capacity(grid_bytes(asset, grid) as usize);
     for cell in asset.grids[grid].chunks_exact(usize::from(shape.channels)) {
         let start = bytes.len();

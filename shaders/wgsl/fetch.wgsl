@@ -1,4 +1,4 @@
-// Fetch: the code of one channel of one cell. See isa/src/layout.rs, `Layout::Linear`.
+// Fetch: the code of one channel of one cell. See isa/src/layout/, `Layout::LINEAR`.
 
 // The byte addresses of the four corners (0,0), (1,0), (0,1), (1,1) within their grid.
 fn corner_addresses(grid: u32, corners: Corners) -> vec4<u32> {

@@ -14,8 +14,9 @@ pub(crate) struct Program {
     /// The asset, an .ntx file.
     #[arg(required_unless_present = "manual")]
     asset: Option<PathBuf>,
-    /// Where the unit's memory keeps the grids.
-    #[arg(long, default_value = "linear", value_parser = layout)]
+    /// Where the unit's memory keeps the grids: linear, tiles-4, tiles-4-rows, morton, super-4, … (other
+    /// sides are 2, 8 and 16), alone or with +planar or +together.
+    #[arg(long, default_value_t = Layout::LINEAR)]
     layout: Layout,
     /// Check this assembly against the asset instead of compiling the asset.
     #[arg(long, value_name = "FILE")]
@@ -23,15 +24,6 @@ pub(crate) struct Program {
     /// Print the reference manual of the instruction set instead.
     #[arg(long)]
     manual: bool,
-}
-
-/// The layout with this name.
-pub(crate) fn layout(name: &str) -> Result<Layout, String> {
-    let names = Layout::ALL.map(Layout::name);
-    Layout::ALL
-        .into_iter()
-        .find(|layout| layout.name() == name)
-        .ok_or_else(|| format!("found {name:?}; allowed: {}", names.join(", ")))
 }
 
 impl Program {
@@ -46,7 +38,10 @@ impl Program {
         };
         let asset = files::read_asset(&path)?;
         let program = match &self.check {
-            None => Microprogram::compile(&asset, self.layout),
+            None => {
+                self.layout.check(&asset.shape)?;
+                Microprogram::compile(&asset, self.layout)
+            }
             Some(file) => {
                 let context = || format!("{}", file.display());
                 let text = std::fs::read_to_string(file).with_context(context)?;
@@ -64,10 +59,10 @@ impl Program {
                 .iter()
                 .map(|(word, text)| json!({ "word": format!("{word:016x}"), "assembly": text }))
                 .collect();
-            let layout = program.layout().name();
+            let layout = program.layout().to_string();
             console::print_json(&json!({ "layout": layout, "instructions": instructions }))?;
         } else {
-            let mut text = format!(".layout {}\n", program.layout().name());
+            let mut text = format!(".layout {}\n", program.layout());
             for (word, line) in lines {
                 text.push_str(&format!("{line:<40}; {word:016x}\n"));
             }

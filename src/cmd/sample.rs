@@ -83,7 +83,7 @@ impl Sample {
         let asset = self.profile.apply(files::read_asset(&self.asset)?)?;
         let request = self.request()?;
         let sampler = self.sampler()?;
-        let program = Program::compile(&asset, Layout::Linear);
+        let program = Program::compile(&asset, Layout::LINEAR);
         let decoder = Decoder::new(&asset, &program);
         let texture = Texture::new(&decoder, sampler).context("sampler")?;
         let result = match self.gather {

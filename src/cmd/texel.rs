@@ -24,8 +24,9 @@ pub(crate) struct Texel {
     y: u32,
     /// The mip; 0 is the largest.
     mip: u8,
-    /// Where the unit's memory keeps the grids.
-    #[arg(long, default_value = "linear", value_parser = super::program::layout)]
+    /// Where the unit's memory keeps the grids: linear, tiles-4, tiles-4-rows, morton, super-4, … (other
+    /// sides are 2, 8 and 16), alone or with +planar or +together.
+    #[arg(long, default_value_t = Layout::LINEAR)]
     layout: Layout,
     #[command(flatten)]
     profile: ProfileChoice,
@@ -35,6 +36,7 @@ impl Texel {
     pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
         let asset = self.profile.apply(files::read_asset(&self.asset)?)?;
         let request = Request::new(&asset.shape, self.x, self.y, self.mip)?;
+        self.layout.check(&asset.shape)?;
         let program = Program::compile(&asset, self.layout);
         let taps = Decoder::new(&asset, &program).taps(request);
         if json {

@@ -154,7 +154,7 @@ mod tests {
         let finest = with_activations(&asset, 16).unwrap();
         let halves = in_halves(&asset).unwrap();
         let taps = |asset: &Asset, request| {
-            let program = Program::compile(asset, Layout::Linear);
+            let program = Program::compile(asset, Layout::LINEAR);
             Decoder::new(asset, &program).taps(request)
         };
         let distance = |a: &[i32], b: &[i32]| -> i64 {

@@ -29,7 +29,7 @@ impl EngineStudy {
 /// Compares both at texels of every mip.
 #[must_use]
 pub fn compare_with_reference(asset: &Asset) -> EngineStudy {
-    let program = Program::compile(asset, Layout::Linear);
+    let program = Program::compile(asset, Layout::LINEAR);
     let decoder = Decoder::new(asset, &program);
     let engine = Engine::new(asset);
     let mut scratch = engine.scratch();

@@ -20,7 +20,7 @@ pub fn vectors(asset: &Asset) -> Result<String, VectorError> {
     let about = "texels on the diagonal of every mip, with the values of every stage";
     let mut builder = Builder::new("texel", about);
     builder.asset("asset", "the asset under study", asset);
-    let program = Program::compile(asset, Layout::Linear);
+    let program = Program::compile(asset, Layout::LINEAR);
     let decoder = Decoder::new(asset, &program);
     for mip in 0..asset.shape.mip_count {
         for request in diagonal(asset, mip) {

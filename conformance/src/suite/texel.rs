@@ -46,7 +46,7 @@ struct Place {
 }
 
 fn decode(builder: &mut Builder, subject: &Subject, asset: &Asset) {
-    let program = Program::compile(asset, Layout::Linear);
+    let program = Program::compile(asset, Layout::LINEAR);
     let decoder = Decoder::new(asset, &program);
     let mut places = places(&asset.shape);
     separate(asset, &decoder, &mut places);
@@ -127,7 +127,7 @@ fn separate(asset: &Asset, decoder: &Decoder<'_>, places: &mut Vec<Place>) {
         let Ok(other) = Asset::new(parts) else {
             continue;
         };
-        let program = Program::compile(&other, Layout::Linear);
+        let program = Program::compile(&other, Layout::LINEAR);
         let other = Decoder::new(&other, &program);
         let differs = |request| decoder.texel(request, &mut ()) != other.texel(request, &mut ());
         if places.iter().any(|place| differs(place.request)) {

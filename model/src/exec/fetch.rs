@@ -1,28 +1,52 @@
-//! Fetch: the codes of four corners, and where memory keeps them.
+//! Fetch: the codes of four corners, read from memory where the program's layout keeps them.
 
 use super::position::Corners;
 use crate::trace::Fetch;
-use ntmu_isa::Asset;
 use ntmu_isa::layout::Layout;
+use ntmu_isa::shape::Shape;
+use ntmu_isa::{Asset, Program};
 
-/// The codes of the four corners one after the other.
-pub(super) fn codes(asset: &Asset, grid: usize, corners: &Corners, codes: &mut Vec<u8>) {
-    codes.clear();
-    for (column, row) in corners.cells() {
-        codes.extend_from_slice(asset.cell(grid, column, row));
+/// The memory that a unit fetches from: the grids of an asset, laid out for a program.
+pub(super) struct Memory<'a> {
+    shape: &'a Shape,
+    layout: Layout,
+    image: Vec<u8>,
+}
+
+impl<'a> Memory<'a> {
+    pub(super) fn new(asset: &'a Asset, program: &Program) -> Memory<'a> {
+        let (shape, layout) = (&asset.shape, program.layout());
+        let [grid0, grid1] = &asset.grids;
+        Memory {
+            shape,
+            layout,
+            image: layout.pack(shape, [grid0, grid1]),
+        }
+    }
+
+    /// The codes of the four corners one after the other.
+    pub(super) fn codes(&self, grid: usize, corners: &Corners, codes: &mut Vec<u8>) {
+        codes.clear();
+        for (x, y) in corners.cells() {
+            self.layout
+                .cell(self.shape, &self.image, (grid, x, y), codes);
+        }
+    }
+
+    /// The bytes that hold them.
+    pub(super) fn addresses(&self, grid: usize, corners: &Corners) -> Fetch {
+        addresses(self.shape, self.layout, grid, corners)
     }
 }
 
-pub(super) fn addresses(asset: &Asset, layout: Layout, grid: usize, corners: &Corners) -> Fetch {
-    let shape = &asset.shape;
-    let addresses = corners
-        .cells()
-        .map(|(column, row)| layout.address(shape, grid, column, row));
+/// Where memory keeps the codes of four corners.
+pub(super) fn addresses(shape: &Shape, layout: Layout, grid: usize, corners: &Corners) -> Fetch {
+    let address = |(x, y)| layout.address(shape, grid, x, y);
     Fetch {
         grid: grid as u8,
-        addresses,
-        cell_bytes: Layout::cell_bytes(shape, grid) as u32,
-        planes: 1,
-        plane_bytes: 0,
+        addresses: corners.cells().map(address),
+        cell_bytes: layout.cell_bytes(shape, grid) as u32,
+        planes: layout.planes(shape, grid),
+        plane_bytes: layout.plane_bytes(shape, grid),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::layer::Held;
 use super::position::Corners;
-use super::{Decoder, Probe, embed, fetch, half, interpolate, layer, output, position};
+use super::{Decoder, Probe, embed, half, interpolate, layer, output, position};
 use crate::place::Place;
 use crate::request::Request;
 use ntmu_isa::embed::Wave;
@@ -71,9 +71,9 @@ impl<'d, 'a> Machine<'d, 'a> {
             }
             Instruction::Fetch { grid } => {
                 let g = usize::from(grid);
-                fetch::codes(asset, g, &self.corners[g], &mut self.codes[g]);
-                let layout = self.decoder.program.layout();
-                probe.fetch(&fetch::addresses(asset, layout, g, &self.corners[g]));
+                let memory = &self.decoder.memory;
+                memory.codes(g, &self.corners[g], &mut self.codes[g]);
+                probe.fetch(&memory.addresses(g, &self.corners[g]));
                 probe.codes(g, &self.codes[g]);
             }
             Instruction::Concat { dst, lane, grid } => {

@@ -26,6 +26,7 @@ use crate::place::Place;
 use crate::request::Request;
 use crate::trace::{Fetch, Trace};
 use dense::Weights;
+use fetch::Memory;
 use machine::Machine;
 use ntmu_isa::instruction::Instruction;
 use ntmu_isa::position::PHASE_BITS;
@@ -35,6 +36,7 @@ use ntmu_isa::{Asset, Program};
 pub struct Decoder<'a> {
     asset: &'a Asset,
     program: &'a Program,
+    memory: Memory<'a>,
     weights: Vec<Weights>,
 }
 
@@ -50,6 +52,7 @@ impl<'a> Decoder<'a> {
         Decoder {
             asset,
             program,
+            memory: Memory::new(asset, program),
             weights,
         }
     }

@@ -92,9 +92,10 @@ pub fn work_of(asset: &Asset, program: &Program) -> Work {
     for instruction in program.instructions() {
         match *instruction {
             Instruction::Position { grid: _ } => work.positions += 1,
-            Instruction::Fetch { grid: _ } => {
+            Instruction::Fetch { grid } => {
                 work.fetches += 1;
-                work.address_steps += 1;
+                let layout = program.layout();
+                work.address_steps += layout.address_steps(&asset.shape, usize::from(grid));
             }
             Instruction::Concat {
                 dst: _,

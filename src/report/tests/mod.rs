@@ -115,7 +115,7 @@ fn study() -> Study {
             ),
             row(
                 "small",
-                "tiled",
+                "tiles-4",
                 vec![charge("weight-fill", 3), charge("compute", 401)],
             ),
         ],

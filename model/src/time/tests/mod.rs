@@ -28,7 +28,7 @@ impl Watch for Missed {
 
 #[test]
 fn two_texels_take_the_cycles_counted_by_hand() {
-    let (asset, program, _) = scan(&tiny(), Layout::Linear);
+    let (asset, program, _) = scan(&tiny(), Layout::LINEAR);
     let trace = Asked::Texels(Request::blocks(&asset.shape, 0).take(2).collect());
     let unit = unit(&[
         ("requests_per_cycle", 1),
@@ -108,14 +108,14 @@ fn work_counts_the_multiplications_of_the_layers() {
         ..tiny()
     };
     for sketch in [tiny(), thin(), hardware_sized(), gated.clone(), mixed] {
-        let (asset, program, _) = scan(&sketch, Layout::Tiled);
+        let (asset, program, _) = scan(&sketch, Layout::TILED);
         let work = work_of(&asset, &program);
         assert_eq!(work.macs(), u64::from(asset.macs()));
         assert_eq!(work.parameter_bytes(), asset.parameter_bits() / 8);
         assert_eq!(work.channels, u32::from(sketch.channels));
         assert_eq!((work.positions, work.fetches), (2, 2));
     }
-    let (asset, program, _) = scan(&gated, Layout::Tiled);
+    let (asset, program, _) = scan(&gated, Layout::TILED);
     // Two gated layers of 5, one channel; the second layer adds 5 skipped activations.
     let work = work_of(&asset, &program);
     assert_eq!(work.requantizer_slots(), 5 * 3 + 5 * 3 + 1);
@@ -127,7 +127,7 @@ fn work_counts_the_multiplications_of_the_layers() {
 
 #[test]
 fn a_cache_that_holds_everything_reads_every_line_once() {
-    for layout in Layout::ALL {
+    for layout in [Layout::LINEAR, Layout::TILED] {
         let (asset, program, trace) = scan(&thin(), layout);
         let unit = unit(&[("cache_sets", 1024), ("cache_ways", 8)]);
         let timing = simulate(&unit, &asset, &program, &trace);
@@ -161,7 +161,7 @@ fn a_cache_that_holds_everything_reads_every_line_once() {
 
 #[test]
 fn a_line_is_looked_up_once_for_the_texels_of_a_group_and_a_cell_may_lie_in_two() {
-    let (asset, program, _) = scan(&tiny(), Layout::Linear);
+    let (asset, program, _) = scan(&tiny(), Layout::LINEAR);
     let lookups = |coalesced, trace: &Asked| {
         let unit = unit(&[("coalesced_texels", coalesced), ("cache_banks", 4)]);
         let timing = simulate(&unit, &asset, &program, trace);
@@ -189,7 +189,7 @@ fn a_line_is_looked_up_once_for_the_texels_of_a_group_and_a_cell_may_lie_in_two(
 
 #[test]
 fn corners_in_one_bank_are_looked_up_one_after_the_other() {
-    let (asset, program, _) = scan(&tiny(), Layout::Linear);
+    let (asset, program, _) = scan(&tiny(), Layout::LINEAR);
     let run = |trace: &Asked, banks, lookups| {
         let ideal = unit(&[("coalesced_texels", 1), ("batch_texels", 1)]).with_ideal_memory();
         let changes = [("cache_banks", banks), ("lookups_per_bank", lookups)];
@@ -221,7 +221,7 @@ fn corners_in_one_bank_are_looked_up_one_after_the_other() {
 
 #[test]
 fn a_miss_waits_for_a_register_and_a_second_miss_of_a_line_does_not() {
-    let (asset, program, _) = scan(&tiny(), Layout::Linear);
+    let (asset, program, _) = scan(&tiny(), Layout::LINEAR);
     let changes = [("coalesced_texels", 1), ("batch_texels", 1), ("mshrs", 1)];
     let unit = unit(&changes);
     let one_line = simulate(
@@ -241,7 +241,7 @@ fn a_miss_waits_for_a_register_and_a_second_miss_of_a_line_does_not() {
 
 #[test]
 fn a_slow_output_is_charged_to_the_output_queue() {
-    let (asset, program, trace) = scan(&hardware_sized(), Layout::Tiled);
+    let (asset, program, trace) = scan(&hardware_sized(), Layout::TILED);
     let slow = unit(&[
         ("output_channels_per_cycle", 1),
         ("mac_rows", 64),
@@ -267,7 +267,7 @@ fn every_resource_is_the_bottleneck_of_the_unit_that_is_short_of_it() {
         hidden: hidden.to_vec(),
         ..thin()
     };
-    let (asset, program, blocks) = scan(&sketch, Layout::Tiled);
+    let (asset, program, blocks) = scan(&sketch, Layout::TILED);
     let scattered: Vec<[u64; 4]> = (0..256)
         .map(|t| [0, 1, 2, 3].map(|c| (4 * t + c) * 64))
         .collect();
@@ -333,7 +333,7 @@ fn every_resource_is_the_bottleneck_of_the_unit_that_is_short_of_it() {
 
 #[test]
 fn weights_that_do_not_fit_are_streamed_for_each_batch() {
-    let (asset, program, trace) = scan(&hardware_sized(), Layout::Tiled);
+    let (asset, program, trace) = scan(&hardware_sized(), Layout::TILED);
     let whole = work_of(&asset, &program).parameter_bytes();
     let fits = simulate(&unit(&[]), &asset, &program, &trace);
     assert_eq!(fits.weight_bytes, whole);
@@ -345,7 +345,7 @@ fn weights_that_do_not_fit_are_streamed_for_each_batch() {
 #[test]
 fn a_deep_corner_fifo_hides_the_latency_of_memory() {
     // Igehy, Eldridge and Proudfoot 1998: 97 % of the performance without latency.
-    let (asset, program, trace) = scan(&thin(), Layout::Tiled);
+    let (asset, program, trace) = scan(&thin(), Layout::TILED);
     let cycles = |latency, fifo| {
         let wide = unit(&[
             ("memory_latency_cycles", latency),
@@ -369,7 +369,7 @@ fn a_deep_corner_fifo_hides_the_latency_of_memory() {
 
 #[test]
 fn no_texels_take_no_cycles() {
-    let (asset, program, _) = scan(&tiny(), Layout::Linear);
+    let (asset, program, _) = scan(&tiny(), Layout::LINEAR);
     let timing = simulate(
         &Unit::console(),
         &asset,

@@ -18,7 +18,7 @@ fn operands_wider_than_bytes_pass_the_array_as_often_as_the_unit_says() {
         ..thin()
     };
     let compute = |sketch: &Sketch, changes: &[(&str, u32)]| {
-        let (asset, program, trace) = scan(sketch, Layout::Tiled);
+        let (asset, program, trace) = scan(sketch, Layout::TILED);
         let timing = simulate(&unit(changes), &asset, &program, &trace);
         (timing.ledger.of(Cause::Compute), trace.count() as u64)
     };
@@ -47,7 +47,7 @@ fn a_tile_of_halves_takes_twice_as_long_to_load() {
             hidden: vec![hidden],
             ..thin()
         };
-        let (asset, program, trace) = scan(&sketch, Layout::Tiled);
+        let (asset, program, trace) = scan(&sketch, Layout::TILED);
         let unit = unit(&[("tile_load_cycles", 50), ("half_passes", 1)]);
         let timing = simulate(&unit, &asset, &program, &trace);
         let batches = trace.count() as u64 / 16;
@@ -71,7 +71,7 @@ fn steps_of_an_fp16_layer_are_charged_like_those_that_they_stand_for() {
             last: kind,
             ..tiny()
         };
-        let (asset, program, _) = scan(&sketch, Layout::Linear);
+        let (asset, program, _) = scan(&sketch, Layout::LINEAR);
         let work = work_of(&asset, &program);
         let dense = work.dense.iter();
         let dense = dense
