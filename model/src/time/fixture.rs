@@ -206,12 +206,13 @@ pub(super) fn scan(sketch: &Sketch, layout: Layout) -> (Asset, Program, Trace) {
     (asset, program, trace)
 }
 
-/// The preset `mobile` with some fields changed.
+/// The preset `mobile` with some fields changed. A quad is as small as a job that is smaller.
 pub(super) fn unit(changes: &[(&str, u32)]) -> Unit {
     let mut configuration = *Unit::mobile().configuration();
     for &(name, value) in changes {
         configuration.set(name, value).unwrap();
     }
+    configuration.quad_pixels = configuration.quad_pixels.min(configuration.job_texels());
     Unit::new("test", configuration).unwrap()
 }
 

@@ -11,6 +11,7 @@
 //! | [`ledger`] | what each cycle was spent on |
 //! | [`closed_form`](mod@closed_form) | the fewest cycles that any such unit needs |
 //! | [`report`] | all of it as numbers |
+//! | [`energy`](mod@energy) | what was done, at published prices |
 //! | [`ramulator`] | the misses as another simulator's trace |
 //!
 //! What is simplified, and which way it errs:
@@ -31,6 +32,7 @@
 //!   handed over together.
 
 pub mod closed_form;
+pub mod energy;
 pub mod ledger;
 pub mod presets;
 pub mod ramulator;
