@@ -13,6 +13,7 @@ mod program;
 mod sample;
 mod study;
 mod texel;
+mod unit;
 
 use crate::Verdict;
 use clap::{Parser, Subcommand};
@@ -53,6 +54,8 @@ enum Verb {
     Convert(convert::Convert),
     /// List the profiles, or print one: the choices that implementations make differently.
     Profile(profile::Profile),
+    /// List the units, or print one: hardware configurations with the reason for every number.
+    Unit(unit::UnitVerb),
     /// Run conformance vectors on a device.
     Conform(conform::Conform),
     /// Write the built-in texture set as image files.
@@ -75,6 +78,7 @@ impl Arguments {
             Verb::Conform(verb) => verb.run(json),
             Verb::Convert(verb) => verb.run(json),
             Verb::Profile(verb) => verb.run(json),
+            Verb::Unit(verb) => verb.run(json),
             Verb::Generate(verb) => verb.run(json),
         }
     }

@@ -41,7 +41,12 @@ impl Addresses for Tracer<'_> {
         for &grid in &self.grids {
             // The phase does not move a corner.
             let corners = position::corners(&self.asset.shape, grid, place, PHASE_BITS);
-            fetches.push(fetch::addresses(&self.asset.shape, self.layout, grid, &corners));
+            fetches.push(fetch::addresses(
+                &self.asset.shape,
+                self.layout,
+                grid,
+                &corners,
+            ));
         }
     }
 

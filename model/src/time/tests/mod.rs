@@ -33,7 +33,8 @@ fn two_texels_take_the_cycles_counted_by_hand() {
     let unit = unit(&[
         ("requests_per_cycle", 1),
         ("coalesced_texels", 1),
-        ("address_generators", 1),
+        ("address_generators", 2),
+        ("weight_latency_cycles", 0),
         ("hit_latency_cycles", 1),
         ("memory_latency_cycles", 10),
         ("memory_bytes_per_cycle", 64),

@@ -49,7 +49,11 @@ fn any_unit() -> impl Strategy<Value = Unit> {
         ] {
             *power = power.next_power_of_two().min(64);
         }
+        c.cache_banks = c.cache_banks.min(c.cache_sets);
         c.decoded_block_side = 1 << (c.decoded_block_side % 4);
+        c.decoded_cache_blocks = c
+            .decoded_cache_blocks
+            .next_multiple_of(c.decoded_cache_ways);
         for queue in [&mut c.request_queue_texels, &mut c.corner_fifo_texels] {
             *queue = (*queue).max(c.coalesced_texels);
         }

@@ -1,9 +1,10 @@
-//! Unit: one hardware configuration, as data.
+//! Configuration: the fields of a unit, unchecked.
 //!
 //! The table below is the only place that knows the fields: the struct, its limits, [`FIELDS`] and
-//! [`Configuration::set`] are read off it. A [`Unit`] is the proof that a configuration can be built.
+//! [`Configuration::set`] are read off it.
 
-use super::choice::{CacheKind, Dataflow, Misses, Replacement, Wiring};
+use super::UnitError;
+use crate::time::choice::{CacheKind, Dataflow, Misses, Replacement, Wiring};
 use std::fmt;
 
 /// What a field may be.
@@ -82,6 +83,12 @@ macro_rules! configuration {
         ];
 
         impl Configuration {
+            /// The smallest numbers and the first choices: where reading a complete file starts.
+            pub(super) const LOWEST: Configuration = Configuration {
+                $( $field: $low, )*
+                $( $choice: $type::ALL[0], )*
+            };
+
             /// Every field with its value, in the order of [`FIELDS`].
             #[must_use]
             pub fn fields(&self) -> Vec<(&'static Field, Value)> {
@@ -93,7 +100,8 @@ macro_rules! configuration {
             /// Gives a number another value, by name.
             ///
             /// # Errors
-            /// When there is no such number. The value is checked by [`Unit::new`].
+            /// When there is no such number. The value is checked by
+            /// [`Unit::new`](super::Unit::new).
             pub fn set(&mut self, name: &str, value: u32) -> Result<(), UnitError> {
                 match name {
                     $( stringify!($field) => self.$field = value, )*
@@ -146,8 +154,9 @@ configuration! {
     /// Texels that go through the front end together and whose lines are looked up once: 1 for
     /// none, 4 for a quad (Skybox, `dups` in `VX_tex_mem.sv`).
     coalesced_texels ["texels"] 1..=64,
-    /// Grid positions computed in a cycle; a texel needs one for each grid.
-    address_generators ["positions per cycle"] 1..=1024,
+    /// Multiply-adds of the address generators in a cycle; a grid position takes as many as a corner
+    /// of the layout has steps ([`ntmu_isa::layout::Layout::address_steps`]), 2 in rows or tiles.
+    address_generators ["multiply-adds per cycle"] 1..=1024,
     /// Bytes of a line of the latent cache, a power of two.
     line_bytes ["bytes"] 16..=256,
     /// Sets of the latent cache, a power of two.
@@ -253,286 +262,6 @@ configuration! {
     }
 }
 
-/// Why a configuration is no unit.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum UnitError {
-    /// A field is out of its range.
-    Range {
-        /// The field.
-        field: &'static str,
-        /// Its value.
-        found: u32,
-        /// The smallest value.
-        low: u32,
-        /// The largest value.
-        high: u32,
-    },
-    /// A field is no power of two.
-    PowerOfTwo {
-        /// The field.
-        field: &'static str,
-        /// Its value.
-        found: u32,
-    },
-    /// A field is no multiple of another.
-    Multiple {
-        /// The field.
-        field: &'static str,
-        /// Its value.
-        found: u32,
-        /// The other field.
-        of: &'static str,
-        /// The other's value.
-        allowed: u32,
-    },
-    /// A queue cannot hold the smallest thing that enters it.
-    Capacity {
-        /// The field.
-        field: &'static str,
-        /// Its value.
-        found: u32,
-        /// What enters it.
-        holds: &'static str,
-        /// The smallest value.
-        allowed: u32,
-    },
-    /// A choice has no such name.
-    Choice {
-        /// The field.
-        field: &'static str,
-        /// The name found.
-        found: String,
-        /// The names that it has.
-        allowed: &'static [&'static str],
-    },
-    /// No field has this name.
-    Field {
-        /// The name.
-        found: String,
-    },
-    /// No preset has this name.
-    Preset {
-        /// The name.
-        found: String,
-    },
-}
-
-impl fmt::Display for UnitError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            UnitError::Range {
-                field,
-                found,
-                low,
-                high,
-            } => {
-                write!(f, "unit.{field}: found {found}; allowed: {low}..={high}")
-            }
-            UnitError::PowerOfTwo { field, found } => {
-                write!(f, "unit.{field}: found {found}; allowed: a power of two")
-            }
-            UnitError::Multiple {
-                field,
-                found,
-                of,
-                allowed,
-            } => {
-                write!(
-                    f,
-                    "unit.{field}: found {found}; allowed: a multiple of {allowed}, its {of}"
-                )
-            }
-            UnitError::Capacity {
-                field,
-                found,
-                holds,
-                allowed,
-            } => {
-                write!(
-                    f,
-                    "unit.{field}: found {found}; allowed: at least {allowed}, {holds}"
-                )
-            }
-            UnitError::Choice {
-                field,
-                found,
-                allowed,
-            } => {
-                let names = allowed.join(", ");
-                write!(f, "unit.{field}: found {found:?}; allowed: {names}")
-            }
-            UnitError::Field { found } => {
-                let names: Vec<&str> = FIELDS.iter().map(|field| field.name).collect();
-                write!(
-                    f,
-                    "unit field: found {found:?}; allowed: {}",
-                    names.join(", ")
-                )
-            }
-            UnitError::Preset { found } => {
-                let names = super::presets::NAMES.join(", ");
-                write!(f, "unit: found {found:?}; allowed: {names}")
-            }
-        }
-    }
-}
-
-impl std::error::Error for UnitError {}
-
-/// One hardware configuration, validated. Its fields are read through it: `unit.mac_rows`.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Unit {
-    name: String,
-    configuration: Configuration,
-}
-
-impl std::ops::Deref for Unit {
-    type Target = Configuration;
-
-    fn deref(&self) -> &Configuration {
-        &self.configuration
-    }
-}
-
-impl Unit {
-    /// The configuration, checked.
-    ///
-    /// # Errors
-    /// The first field that is out of range or contradicts another.
-    pub fn new(name: impl Into<String>, configuration: Configuration) -> Result<Unit, UnitError> {
-        let c = &configuration;
-        for (field, value) in c.fields() {
-            // A choice is one of its own by its type.
-            if let (Range::Number { low, high }, Value::Number(found)) = (field.range, value)
-                && !(low..=high).contains(&found)
-            {
-                return Err(UnitError::Range {
-                    field: field.name,
-                    found,
-                    low,
-                    high,
-                });
-            }
-        }
-        for (field, found) in [
-            ("line_bytes", c.line_bytes),
-            ("cache_sets", c.cache_sets),
-            ("cache_banks", c.cache_banks),
-            ("burst_bytes", c.burst_bytes),
-            ("decoded_block_side", c.decoded_block_side),
-            // None is allowed too.
-            ("level2_sets", c.level2_sets.max(1)),
-        ] {
-            if !found.is_power_of_two() {
-                return Err(UnitError::PowerOfTwo { field, found });
-            }
-        }
-        if !c.batch_texels.is_multiple_of(c.coalesced_texels) {
-            return Err(UnitError::Multiple {
-                field: "batch_texels",
-                found: c.batch_texels,
-                of: "coalesced_texels",
-                allowed: c.coalesced_texels,
-            });
-        }
-        let group = "one coalesced group";
-        for (field, found, holds, allowed) in [
-            (
-                "request_queue_texels",
-                c.request_queue_texels,
-                group,
-                c.coalesced_texels,
-            ),
-            (
-                "corner_fifo_texels",
-                c.corner_fifo_texels,
-                group,
-                c.coalesced_texels,
-            ),
-            (
-                "output_queue_pixels",
-                c.output_queue_pixels,
-                "one job",
-                c.job_texels(),
-            ),
-        ] {
-            if found < allowed {
-                return Err(UnitError::Capacity {
-                    field,
-                    found,
-                    holds,
-                    allowed,
-                });
-            }
-        }
-        Ok(Unit {
-            name: name.into(),
-            configuration,
-        })
-    }
-
-    /// A unit of [`super::presets`], whose tests check it.
-    pub(super) fn preset(name: &str, configuration: Configuration) -> Unit {
-        Unit {
-            name: name.to_owned(),
-            configuration,
-        }
-    }
-
-    /// Its name.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// Its numbers, for building another unit from them.
-    #[must_use]
-    pub fn configuration(&self) -> &Configuration {
-        &self.configuration
-    }
-
-    /// The same unit behind an ideal memory: nothing is ever waited for that comes from outside.
-    ///
-    /// Precisely: hits and misses have no latency; memory delivers, the banks look up and the miss
-    /// registers hold more than one fetch of a coalesced group can ask for in its cycle; the weight
-    /// SRAM holds the largest program. What remains is one cycle for each fetch of a group, and the
-    /// cycles of the first weight fill at the widest port.
-    #[must_use]
-    pub fn with_ideal_memory(&self) -> Unit {
-        let configuration = Configuration {
-            hit_latency_cycles: 0,
-            level2_sets: 0,
-            weight_latency_cycles: 0,
-            memory_latency_cycles: 0,
-            memory_bytes_per_cycle: 1 << 20,
-            lookups_per_bank: 1 << 12,
-            mshrs: 1 << 12,
-            weight_sram_bytes: 1 << 28,
-            weight_fill_bytes_per_cycle: 1 << 20,
-            ..self.configuration
-        };
-        Unit {
-            name: format!("{}, ideal memory", self.name),
-            configuration,
-        }
-    }
-
-    /// The same unit with queues that hold more than any run puts in them.
-    #[must_use]
-    pub fn with_unbounded_queues(&self) -> Unit {
-        let configuration = Configuration {
-            request_queue_texels: 65_536,
-            corner_fifo_texels: 1_048_576,
-            output_queue_pixels: 1_048_576,
-            ..self.configuration
-        };
-        Unit {
-            name: format!("{}, endless queues", self.name),
-            configuration,
-        }
-    }
-}
-
 impl Configuration {
     /// Texels of a job: the batches that are in the array together.
     #[must_use]
@@ -553,81 +282,31 @@ impl Configuration {
     }
 }
 
-impl fmt::Display for Unit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", self.name)?;
-        for (field, value) in self.fields() {
-            writeln!(f, "  {:<28} {value:>10} {}", field.name, field.unit)?;
-        }
-        Ok(())
-    }
+/// A field by its name.
+pub(super) fn field(name: &str) -> Result<&'static Field, UnitError> {
+    let found = FIELDS.iter().find(|field| field.name == name);
+    found.ok_or_else(|| UnitError::Field {
+        found: name.to_owned(),
+    })
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_field_is_set_by_name_and_refused_just_outside_its_range() {
-        for field in FIELDS {
-            let Range::Number { low, high } = field.range else {
-                continue;
-            };
-            let refused = [low.checked_sub(1), high.checked_add(1)];
-            for found in refused.into_iter().flatten() {
-                let mut changed = *Unit::mobile().configuration();
-                changed.set(field.name, found).unwrap();
-                let expected = UnitError::Range {
-                    field: field.name,
-                    found,
-                    low,
-                    high,
-                };
-                assert_eq!(Unit::new("x", changed), Err(expected));
-            }
-        }
-        let mut unit = *Unit::mobile().configuration();
-        assert!(matches!(
-            unit.set("mac_row", 1),
-            Err(UnitError::Field { .. })
-        ));
+impl Configuration {
+    /// The value of a field of [`FIELDS`].
+    pub(super) fn value(&self, field: &Field) -> Option<Value> {
+        let mut fields = self.fields().into_iter();
+        fields.find(|(f, _)| f.name == field.name).map(|(_, v)| v)
     }
 
-    #[test]
-    fn fields_that_contradict_each_other_are_refused() {
-        let refused = |name: &str, value| {
-            let mut changed = *Unit::mobile().configuration();
-            changed.set(name, value).unwrap();
-            Unit::new("x", changed).unwrap_err().to_string()
-        };
-        assert_eq!(
-            refused("cache_sets", 3),
-            "unit.cache_sets: found 3; allowed: a power of two"
-        );
-        assert_eq!(
-            refused("batch_texels", 6),
-            "unit.batch_texels: found 6; allowed: a multiple of 4, its coalesced_texels"
-        );
-        assert_eq!(
-            refused("corner_fifo_texels", 3),
-            "unit.corner_fifo_texels: found 3; allowed: at least 4, one coalesced group"
-        );
-        assert_eq!(
-            refused("output_queue_pixels", 15),
-            "unit.output_queue_pixels: found 15; allowed: at least 16, one job"
-        );
+    /// Bytes of the second-level cache; 0 without one.
+    #[must_use]
+    pub const fn level2_bytes(&self) -> u64 {
+        self.line_bytes as u64 * self.level2_sets as u64 * self.level2_ways as u64
     }
 
-    #[test]
-    fn ideal_memory_is_itself_a_unit_and_holds_the_largest_program() {
-        use ntmu_isa::limits::{MAX_LANES, MAX_LAYERS};
-        let lanes = u64::from(MAX_LANES);
-        // Halves are the widest weights; a table and the wide rows of bytes are less.
-        let largest = u64::from(MAX_LAYERS) * (lanes * lanes + lanes) * 2;
-        for name in super::super::presets::NAMES {
-            let ideal = Unit::by_name(name).unwrap().with_ideal_memory();
-            assert!(u64::from(ideal.weight_sram_bytes) >= largest);
-            assert_eq!(Unit::new(ideal.name(), *ideal.configuration()), Ok(ideal));
-        }
+    /// Texels that the decoded-texel cache holds; 0 without one.
+    #[must_use]
+    pub const fn decoded_cache_texels(&self) -> u64 {
+        let side = self.decoded_block_side as u64;
+        self.decoded_cache_blocks as u64 * side * side
     }
 }
