@@ -2,9 +2,8 @@
 
 use ntmu_isa::layout::Layout;
 use ntmu_isa::{Asset, Program};
-use ntmu_model::Request;
-use ntmu_model::exec::Decoder;
 use ntmu_model::time::{self, Unit};
+use ntmu_model::{Demand, Material, Place, Request};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -80,20 +79,26 @@ pub fn timing_points() -> u64 {
 
 fn simulate_one(asset: &Asset, unit: &Unit, layout: Layout, requests: &[Request]) -> TimingRow {
     let program = Program::compile(asset, layout);
-    let trace = Decoder::new(asset, &program).trace(requests.iter().copied());
-    let timing = time::simulate(unit, asset, &program, &trace);
+    let materials = [Material::new(&asset.metadata.name, asset, &program)];
+    let mut demands = requests.iter().map(|&request| Demand {
+        places: vec![Place::of(request)],
+        weights: 1,
+        ..Demand::default()
+    });
+    let run = time::simulate(unit, &materials, &mut demands, &mut ());
+    let timing = run.unwrap_or_else(|never| match never {});
     let blocks = timing.blocks;
     TimingRow {
         unit: unit.name().to_owned(),
         layout: layout.to_string(),
-        texels: timing.texels,
+        texels: timing.decodes,
         cycles: timing.cycles,
         cycles_per_block: timing.cycles_per_block,
         closed_form_per_block: timing.closed_form.cycles as f64 / blocks,
         bytes_per_block: timing.bytes_per_block,
         hit_rate: timing.hit_rate,
         mac_utilisation: timing.mac_utilisation,
-        mtexels_per_second: timing.megatexels_per_second,
+        mtexels_per_second: timing.megapixels_per_second,
         bottleneck: timing.bottleneck.name().to_owned(),
         ledger: timing
             .ledger
