@@ -6,13 +6,22 @@
 mod support;
 
 use ntmu::conformance::claims::findings;
-use ntmu::isa::Asset;
+use ntmu::conformance::synthetic::{self, Spec, SpecPrecision};
 use ntmu::isa::layer::Layer;
+use ntmu::isa::layout::Layout;
+use ntmu::isa::{Asset, Program};
 use ntmu::model::Request;
 use ntmu::trainer::{self, Precision, Preset, Steps, TrainConfig};
 use std::sync::atomic::AtomicBool;
 
 fn trained(preset: &Preset, precision: Precision) -> Asset {
+    trained_as(&TrainConfig {
+        precision,
+        ..preset.config()
+    })
+}
+
+fn trained_as(config: &TrainConfig) -> Asset {
     let config = TrainConfig {
         steps: Some(Steps {
             encoder: 0,
@@ -20,8 +29,7 @@ fn trained(preset: &Preset, precision: Precision) -> Asset {
             integer: 2,
         }),
         batch: 768,
-        precision,
-        ..preset.config()
+        ..config.clone()
     };
     let stop = AtomicBool::new(false);
     let source = support::source::brick_wall(32);
@@ -79,4 +87,56 @@ fn the_peers_networks_have_the_widths_that_they_are_known_for() {
     // With the sixteen channels that both give, 8,192 and 6,144 in all.
     assert_eq!(macs("rtxntc") + 32 * 16, 8192);
     assert_eq!(macs("tsnc") + 64 * 16, 6144);
+}
+
+/// What the trainer calls a precision of a synthetic asset.
+fn configured(preset: &Preset, precision: SpecPrecision) -> TrainConfig {
+    let config = preset.config();
+    let (precision, weight_bits) = match precision {
+        SpecPrecision::Int8 => (vec![Precision::Int8; config.layer_count()], 8),
+        SpecPrecision::Int4 => (vec![Precision::Int8; config.layer_count()], 4),
+        SpecPrecision::Fp16 => (vec![Precision::Fp16; config.layer_count()], 8),
+        SpecPrecision::Mixed => {
+            let mut layers = vec![Precision::Int8; config.layer_count()];
+            for index in [0, config.layer_count() - 1] {
+                layers[index] = Precision::Fp16;
+            }
+            (layers, 8)
+        }
+    };
+    TrainConfig {
+        precision_per_layer: Some(precision),
+        weight_bits,
+        ..config
+    }
+}
+
+#[test]
+fn a_synthetic_asset_of_a_preset_asks_of_the_unit_what_a_trained_one_does() {
+    for preset in Preset::ALL {
+        for precision in SpecPrecision::ALL {
+            let at = format!("{} {}", preset.name, precision.name());
+            let trained = trained_as(&configured(&preset, precision));
+            let spec = Spec {
+                shape: trained.shape.clone(),
+                ..Spec::of_preset(&preset, 1, 1, trained.shape.channel_count(), 1, precision)
+            };
+            let synthetic = synthetic::asset(&spec, 1).unwrap();
+            let shape = &trained.shape;
+            let outputs = shape.outputs.clone();
+            assert_eq!(
+                *shape,
+                preset.shape(shape.width, shape.height, shape.mip_count, outputs),
+                "{at}"
+            );
+            let program = |asset| Program::compile(asset, Layout::ALL[0]);
+            let (a, b) = (program(&trained), program(&synthetic));
+            assert_eq!(a.instructions(), b.instructions(), "{at}");
+            assert_eq!(trained.parameter_bits(), synthetic.parameter_bits(), "{at}");
+            for (index, (a, b)) in trained.layers.iter().zip(&synthetic.layers).enumerate() {
+                let bits = |layer: &Layer| layer.parameter_bits(trained.profile.bias_bits);
+                assert_eq!(bits(a), bits(b), "{at} layer {index}");
+            }
+        }
+    }
 }

@@ -13,6 +13,7 @@
 //! | [`activation`] | what happens between two layers |
 //! | [`profile`] | every choice that an implementation may make differently, as data |
 //! | [`shape`], [`layer`], [`asset`] | one compressed texture set, validated |
+//! | [`preset`] | shapes of synthesizers worth comparing, with names |
 //! | [`format`](mod@format) | that asset as bytes: the `.ntx` file |
 //! | [`layout`] | where a unit's memory keeps the grids |
 //! | [`sampler`] | what a request by normalised coordinates means |
@@ -41,6 +42,7 @@ pub mod layout;
 pub mod limits;
 pub mod link;
 pub mod position;
+pub mod preset;
 pub mod profile;
 pub mod program;
 pub mod rescale;

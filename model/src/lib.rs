@@ -6,6 +6,7 @@
 
 #![deny(unsafe_code)]
 
+pub mod control;
 pub mod demand;
 pub mod engine;
 pub mod exec;

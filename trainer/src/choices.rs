@@ -5,23 +5,7 @@ use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::shape::Sampling;
 use serde::{Deserialize, Serialize};
 
-/// The activation of the hidden layers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ActivationKind {
-    /// max(x, 0).
-    Relu,
-    /// x for x ≥ 0, x / 2^shift below.
-    Leaky {
-        /// n of the slope 2^−n, 1..=7.
-        shift: u8,
-    },
-    /// x · clamp(x/3 + ½, 0, 1).
-    HardGelu,
-    /// The same of min(x, 3), as in NVIDIA's RTX SDK.
-    #[serde(rename = "hard-gelu-3")]
-    ClampedHardGelu,
-}
+pub use ntmu_isa::preset::ActivationKind;
 
 /// Where the first corner lies when the stride is more than one cell; see
 /// [`ntmu_isa::position::CornerSnap`].
@@ -39,6 +23,15 @@ impl From<Snap> for CornerSnap {
         match snap {
             Snap::Cell => CornerSnap::Cell,
             Snap::Stride => CornerSnap::Stride,
+        }
+    }
+}
+
+impl From<CornerSnap> for Snap {
+    fn from(snap: CornerSnap) -> Snap {
+        match snap {
+            CornerSnap::Cell => Snap::Cell,
+            CornerSnap::Stride => Snap::Stride,
         }
     }
 }
@@ -65,6 +58,16 @@ impl From<Address> for AddressMode {
     }
 }
 
+impl From<AddressMode> for Address {
+    fn from(address: AddressMode) -> Address {
+        match address {
+            AddressMode::Wrap => Address::Wrap,
+            AddressMode::Mirror => Address::Mirror,
+            AddressMode::Clamp => Address::Clamp,
+        }
+    }
+}
+
 /// The form of the waves; see [`ntmu_isa::embed::Wave`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -84,6 +87,15 @@ impl From<WaveForm> for Wave {
     }
 }
 
+impl From<Wave> for WaveForm {
+    fn from(form: Wave) -> WaveForm {
+        match form {
+            Wave::Triangle => WaveForm::Triangle,
+            Wave::Saw => WaveForm::Saw,
+        }
+    }
+}
+
 /// What a grid gives the synthesizer; see [`ntmu_isa::shape::Sampling`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -99,6 +111,15 @@ impl From<GridSampling> for Sampling {
         match sampling {
             GridSampling::Corners => Sampling::Corners,
             GridSampling::Interpolated => Sampling::Interpolated,
+        }
+    }
+}
+
+impl From<Sampling> for GridSampling {
+    fn from(sampling: Sampling) -> GridSampling {
+        match sampling {
+            Sampling::Corners => GridSampling::Corners,
+            Sampling::Interpolated => GridSampling::Interpolated,
         }
     }
 }

@@ -35,6 +35,7 @@ pub fn arbitrary_spec(seed: u64) -> Spec {
         hidden: (0..layers).map(|_| r.within(1, 17) as u16).collect(),
         blocks: r.within(0, 3) as u8,
         block_span: r.within(1, 3) as u8,
+        has_plain_block_ends: false,
         activation: match r.within(0, 5) {
             0 => SpecActivation::Identity,
             1 => SpecActivation::Relu,

@@ -24,6 +24,18 @@ pub(super) struct Place<'a> {
     pub(super) source: Option<(u8, LaneFormat)>,
 }
 
+impl Place<'_> {
+    /// The activation that the spec has here.
+    fn activation(&self) -> SpecActivation {
+        let ends_block = self.source.is_some();
+        if self.is_last || ends_block && self.spec.has_plain_block_ends {
+            SpecActivation::Identity
+        } else {
+            self.spec.activation
+        }
+    }
+}
+
 /// The layer, fitted to the registers of some samples.
 pub(super) fn layer(place: &Place<'_>, registers: &[&[f64]], random: &mut Random) -> Layer {
     match place.spec.kind(place.index) {
@@ -80,7 +92,7 @@ fn integer(
         scale: gate,
         is_clamped,
     };
-    let (zero_point, activation) = match spec.activation {
+    let (zero_point, activation) = match place.activation() {
         _ if place.is_last => (0.0, Activation::Identity),
         SpecActivation::Identity => (f64::from(random.within(-16, 16)), Activation::Identity),
         SpecActivation::Relu => (-128.0, Activation::Relu),
@@ -125,7 +137,7 @@ fn integer(
             let top = reach * 1.3;
             // Some rows saturate at their extremes, most do not.
             let slack = 0.8 + 0.5 * random.unit();
-            let target = match spec.activation {
+            let target = match place.activation() {
                 SpecActivation::Identity => 120.0 * share * steps,
                 SpecActivation::Relu => 255.0 * share * steps,
                 SpecActivation::Leaky(_) => 217.0 * share * steps,
@@ -217,7 +229,7 @@ fn half(
             bias: Vec::new(),
             quantize: None,
         }),
-        activation: match spec.activation {
+        activation: match place.activation() {
             _ if place.is_last => Activation::Identity,
             SpecActivation::Identity => Activation::Identity,
             SpecActivation::Relu | SpecActivation::Table => Activation::Relu,
@@ -238,7 +250,7 @@ fn half(
     let mut parameters = HalfParameters {
         weights: Vec::new(),
         bias: Vec::new(),
-        quantize: quantize.map(|bits| quantization(spec, bits)),
+        quantize: quantize.map(|bits| quantization(place, bits)),
     };
     for row in 0..place.rows {
         let raw: Vec<f64> = (0..place.inputs)
@@ -267,14 +279,14 @@ fn half(
 }
 
 /// Integers of these bits for sums that reach the spec's power of two.
-fn quantization(spec: &Spec, bits: u8) -> Quantize {
+fn quantization(place: &Place<'_>, bits: u8) -> Quantize {
     let is_positive = matches!(
-        spec.activation,
+        place.activation(),
         SpecActivation::Relu | SpecActivation::Table
     );
     let (low, _) = signed(bits);
     let (least, most) = limits::QUANTIZE_EXPONENT;
-    let exponent = i32::from(bits) - 2 - i32::from(spec.reach) + i32::from(is_positive);
+    let exponent = i32::from(bits) - 2 - i32::from(place.spec.reach) + i32::from(is_positive);
     Quantize {
         bits,
         exponent: exponent.clamp(i32::from(least), i32::from(most)) as i8,

@@ -7,10 +7,12 @@
 
 mod arbitrary;
 mod fit;
+mod preset;
 mod random;
 mod spec;
 
 pub use arbitrary::arbitrary_spec;
+pub use preset::SpecPrecision;
 pub use random::Random;
 pub use spec::{Spec, SpecActivation, SpecKind, SpecScale, corners, interpolated};
 

@@ -69,7 +69,9 @@ pub struct Spec {
     pub blocks: u8,
     /// Layers of a block, which its skip path spans, 1..=3.
     pub block_span: u8,
-    /// Of all hidden layers.
+    /// Whether the last layer of a block has no activation, as none has that the trainer makes.
+    pub has_plain_block_ends: bool,
+    /// Of all other hidden layers.
     pub activation: SpecActivation,
     /// Of all rescalings.
     pub scale: SpecScale,
@@ -105,6 +107,7 @@ impl Spec {
             hidden: vec![6],
             blocks: 1,
             block_span: 2,
+            has_plain_block_ends: false,
             activation: SpecActivation::Relu,
             scale: SpecScale::Arbitrary,
             reach: 0,

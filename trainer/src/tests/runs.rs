@@ -222,7 +222,7 @@ fn a_loss_that_is_no_number_names_its_step() {
 }
 
 #[test]
-fn every_preset_is_valid_and_makes_an_asset() {
+fn every_preset_is_valid_and_makes_an_asset_of_its_sizes() {
     let source = source(24, 16, 3);
     for preset in Preset::ALL {
         let config = TrainConfig {
@@ -241,6 +241,16 @@ fn every_preset_is_valid_and_makes_an_asset() {
             "{}",
             preset.name
         );
+        let outputs = source.outputs.clone();
+        let mip_count = source.mips.len() as u8;
+        let asset = &trained.asset;
+        let shape = preset.shape(asset.shape.width, asset.shape.height, mip_count, outputs);
+        assert_eq!(asset.shape, shape, "{}", preset.name);
+        let layers = asset.layers.iter();
+        let sizes: Vec<(u16, u16)> = layers.map(|l| (l.inputs, l.outputs)).collect();
+        let channels = asset.shape.channel_count();
+        assert_eq!(sizes, preset.layers(channels), "{}", preset.name);
+        assert_eq!(asset.macs(), preset.macs(channels), "{}", preset.name);
         assert_eq!(Preset::by_name(preset.name).unwrap(), preset);
     }
     let error = Preset::by_name("cntc-17").unwrap_err().to_string();
