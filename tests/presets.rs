@@ -129,7 +129,7 @@ fn a_synthetic_asset_of_a_preset_asks_of_the_unit_what_a_trained_one_does() {
                 preset.shape(shape.width, shape.height, shape.mip_count, outputs),
                 "{at}"
             );
-            let program = |asset| Program::compile(asset, Layout::ALL[0]);
+            let program = |asset| Program::compile(asset, Layout::LINEAR);
             let (a, b) = (program(&trained), program(&synthetic));
             assert_eq!(a.instructions(), b.instructions(), "{at}");
             assert_eq!(trained.parameter_bits(), synthetic.parameter_bits(), "{at}");

@@ -11,7 +11,7 @@ use ntmu_isa::{Asset, Program};
 use ntmu_model::exec::Decoder;
 use ntmu_model::{Place, Request};
 
-const LAYOUTS: [Layout; 2] = Layout::ALL;
+const LAYOUTS: [Layout; 2] = [Layout::LINEAR, Layout::TILED];
 const CHANNELS: u16 = 9;
 const SIZE: (u32, u32) = (36, 20);
 const MIP_COUNT: u8 = 6;

@@ -13,6 +13,7 @@
 //! [`BASE_ALIGNMENT`], so that no line of a cache holds parts of two.
 
 use crate::place::Place;
+use crate::time::Work;
 use crate::trace::{Addresses, Fetch};
 use ntmu_isa::layout::BASE_ALIGNMENT;
 use ntmu_isa::limits;
@@ -130,6 +131,9 @@ impl fmt::Display for ControlError {
 
 impl std::error::Error for ControlError {}
 
+/// Multiply-adds of an address: row times pitch, and the base of the mip.
+const ADDRESS_STEPS: u32 = 2;
+
 /// One mip of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Mip {
@@ -195,6 +199,19 @@ impl Maps {
 
     fn bytes(&self) -> u64 {
         self.map_base(self.count - 1) + self.map_bytes
+    }
+
+    /// One address a map, by a row and a base, and nothing to multiply: a group is decoded in a
+    /// cycle, and four channels of each map leave the unit.
+    fn work(&self) -> Work {
+        let count = u32::from(self.count);
+        Work {
+            positions: 1,
+            address_steps: ADDRESS_STEPS * count,
+            fetches: count,
+            channels: 4 * count,
+            ..Work::default()
+        }
     }
 
     fn fetches(&self, place: &Place, fetches: &mut Vec<Fetch>) {
@@ -278,6 +295,12 @@ impl Bc7 {
         let maps = Maps::new(shape, maps, order, (4, 16))?;
         Ok(Bc7 { maps })
     }
+
+    /// What one texel asks of each resource.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        self.maps.work()
+    }
 }
 
 impl Addresses for Bc7 {
@@ -287,6 +310,10 @@ impl Addresses for Bc7 {
 
     fn bytes(&self) -> u64 {
         self.maps.bytes()
+    }
+
+    fn mip_size(&self, mip: u8) -> (u32, u32) {
+        self.maps.mips[usize::from(mip)].size
     }
 }
 
@@ -313,6 +340,12 @@ impl Plain {
         let maps = Maps::new(shape, maps, order, (1, 4))?;
         Ok(Plain { maps })
     }
+
+    /// What one texel asks of each resource.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        self.maps.work()
+    }
 }
 
 impl Addresses for Plain {
@@ -322,5 +355,9 @@ impl Addresses for Plain {
 
     fn bytes(&self) -> u64 {
         self.maps.bytes()
+    }
+
+    fn mip_size(&self, mip: u8) -> (u32, u32) {
+        self.maps.mips[usize::from(mip)].size
     }
 }

@@ -6,7 +6,7 @@
 //!
 //! | thing | is | ends |
 //! |---|---|---|
-//! | quad | successive pixels of one material | at `quad_pixels` |
+//! | quad | successive pixels of one material in one square of 2×2 (of more than four: 4×4) | at `quad_pixels` |
 //! | group | decodes and answered pixels of one material | at `coalesced_texels` of either |
 //! | job | groups of one material in one bin | at `job_texels` of either, or when its bin is needed |
 
@@ -312,10 +312,16 @@ impl<'a, 'd, D: Demands> Assembler<'a, 'd, D> {
         if !self.has_ahead {
             return Ok(());
         }
-        self.items_material = self.ahead.material;
+        let material = self.ahead.material;
+        self.items_material = material;
         self.seen.clear();
+        // The square of pixels that a quad lies in. The sky and a screen's edge leave quads short.
+        let side_log2 = if self.unit.quad_pixels > 4 { 2 } else { 1 };
+        let square = |pixel: [u32; 2]| pixel.map(|at| at >> side_log2);
+        let first = square(self.ahead.pixel);
         for _ in 0..self.unit.quad_pixels {
-            if !self.has_ahead || self.ahead.material != self.items_material {
+            let is_next = self.has_ahead && self.ahead.material == material;
+            if !is_next || square(self.ahead.pixel) != first {
                 break;
             }
             self.take_pixel();
