@@ -12,6 +12,7 @@ pub mod exec;
 pub mod place;
 pub mod request;
 pub mod sampler;
+pub mod stream;
 pub mod time;
 pub mod trace;
 
