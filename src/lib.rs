@@ -27,6 +27,7 @@ pub use ntmu_shaders as shaders;
 #[cfg(feature = "train")]
 pub use ntmu_trainer as trainer;
 
+pub mod access;
 pub mod beside;
 pub mod brick_wall;
 pub mod built_in;

@@ -14,6 +14,7 @@ pub mod material;
 pub mod place;
 pub mod request;
 pub mod sampler;
+pub mod stream;
 pub mod time;
 pub mod trace;
 

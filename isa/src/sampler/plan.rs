@@ -143,8 +143,18 @@ impl SampleRequest {
         shape: &Shape,
         profile: &Profile,
     ) -> Vec<Probe<Square>> {
+        self.each_square(sampler, shape, profile).collect()
+    }
+
+    /// [`SampleRequest::squares`] one after the other, without memory for all of them.
+    pub fn each_square<'a>(
+        &'a self,
+        sampler: &'a Sampler,
+        shape: &'a Shape,
+        profile: &'a Profile,
+    ) -> impl Iterator<Item = Probe<Square>> + use<'a> {
         let (footprint, level) = self.footprint(sampler, shape, profile);
-        let square = |step: [Step; 2], mip: u8| {
+        let square = move |step: [Step; 2], mip: u8| {
             let (width, height) = shape.mip_size(mip);
             let axis = |axis: usize, size: u32| {
                 let scaled = Scaled::of(self.place[axis], sampler.address[axis], step[axis], size);
@@ -173,16 +183,14 @@ impl SampleRequest {
             }
         };
         let random = Random::of(self.random, profile);
-        self.probes(sampler, footprint, &random)
-            .map(|step| {
-                let probe = Probe::between(level, |mip| square(step, mip));
-                if sampler.stochastic {
-                    probe.chosen(random.mip).map(|s| s.chosen(random.texel))
-                } else {
-                    probe
-                }
-            })
-            .collect()
+        self.probes(sampler, footprint, &random).map(move |step| {
+            let probe = Probe::between(level, |mip| square(step, mip));
+            if sampler.stochastic {
+                probe.chosen(random.mip).map(|s| s.chosen(random.texel))
+            } else {
+                probe
+            }
+        })
     }
 
     /// The places of every probe, for an order that filters latents. A stochastic sampler chooses
@@ -190,9 +198,19 @@ impl SampleRequest {
     /// choice.
     #[must_use]
     pub fn spots(&self, sampler: &Sampler, shape: &Shape, profile: &Profile) -> Vec<Probe<Spot>> {
+        self.each_spot(sampler, shape, profile).collect()
+    }
+
+    /// [`SampleRequest::spots`] one after the other, without memory for all of them.
+    pub fn each_spot<'a>(
+        &'a self,
+        sampler: &'a Sampler,
+        shape: &'a Shape,
+        profile: &'a Profile,
+    ) -> impl Iterator<Item = Probe<Spot>> + use<'a> {
         let (footprint, level) = self.footprint(sampler, shape, profile);
         let bits = u32::from(profile.subtexel_bits);
-        let spot = |step: [Step; 2], mip: u8, lod: u32| {
+        let spot = move |step: [Step; 2], mip: u8, lod: u32| {
             let (width, height) = shape.mip_size(mip);
             let axis = |axis: usize, size: u32| {
                 let address = sampler.address[axis];
@@ -209,7 +227,7 @@ impl SampleRequest {
         };
         let random = Random::of(self.random, profile);
         self.probes(sampler, footprint, &random)
-            .map(|step| match sampler.mip_blend {
+            .map(move |step| match sampler.mip_blend {
                 MipBlend::Codes => {
                     let of_mip = |mip| u32::from(mip) << profile.lod_bits;
                     let probe = Probe::between(level, |mip| spot(step, mip, of_mip(mip)));
@@ -224,7 +242,6 @@ impl SampleRequest {
                     Probe::one(spot(step, level.mip, lod))
                 }
             })
-            .collect()
     }
 
     /// The four texels of a gather in Direct3D's order: lower left, lower right, upper right, upper

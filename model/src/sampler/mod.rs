@@ -5,8 +5,10 @@
 //! [`Decode`].
 
 mod reads;
+mod sampled;
 
 pub use reads::Reads;
+pub use sampled::Sampled;
 
 use crate::exec::Decoder;
 use crate::place::Place;
@@ -16,6 +18,7 @@ use ntmu_isa::sampler::blend::{Corners, blend};
 use ntmu_isa::sampler::plan::{Probe, Spot, Square};
 use ntmu_isa::sampler::{Order, SampleRequest, Sampler, SamplerError};
 use ntmu_isa::shape::Shape;
+use reads::{Corner, corners, place_of};
 
 /// What decodes texels and places of one asset.
 ///
@@ -269,10 +272,10 @@ struct Slots {
 
 impl Slots {
     fn of_square(square: &Square, reads: &mut Reads) -> Slots {
-        let slots = [0, 1, 2, 3].map(|corner| match square.corner(corner) {
-            _ if !square.counts(corner) => Slot::Unread,
-            Some((x, y)) => Slot::Decoded(reads.texel(Request::within(x, y, square.mip))),
-            None => Slot::Border,
+        let slots = corners(square).map(|corner| match corner {
+            Corner::Texel(texel) => Slot::Decoded(reads.texel(texel)),
+            Corner::Border => Slot::Border,
+            Corner::Unread => Slot::Unread,
         });
         Slots {
             slots,
@@ -281,10 +284,8 @@ impl Slots {
     }
 
     fn of_spot(spot: &Spot, profile: &Profile, reads: &mut Reads) -> Slots {
-        let (bits, lod_bits) = (profile.subtexel_bits, profile.lod_bits);
-        let place = Place::within(spot.coordinates, bits, spot.mip, spot.lod, lod_bits);
         Slots {
-            slots: [Slot::Decoded(reads.place(place)); 4],
+            slots: [Slot::Decoded(reads.place(place_of(spot, profile))); 4],
             fractions: [0; 2],
         }
     }

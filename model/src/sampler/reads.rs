@@ -3,6 +3,34 @@
 use super::Decode;
 use crate::place::Place;
 use crate::request::Request;
+use ntmu_isa::profile::Profile;
+use ntmu_isa::sampler::plan::{Spot, Square};
+
+/// What one corner of a square takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Corner {
+    /// A decode.
+    Texel(Request),
+    /// The sampler's border codes: no decode.
+    Border,
+    /// Nothing: it has no weight.
+    Unread,
+}
+
+/// What the corners (0,0), (1,0), (0,1) and (1,1) of a square take.
+pub(super) fn corners(square: &Square) -> [Corner; 4] {
+    [0, 1, 2, 3].map(|corner| match square.corner(corner) {
+        _ if !square.counts(corner) => Corner::Unread,
+        Some((x, y)) => Corner::Texel(Request::within(x, y, square.mip)),
+        None => Corner::Border,
+    })
+}
+
+/// The decode of a spot.
+pub(super) fn place_of(spot: &Spot, profile: &Profile) -> Place {
+    let (bits, lod_bits) = (profile.subtexel_bits, profile.lod_bits);
+    Place::within(spot.coordinates, bits, spot.mip, spot.lod, lod_bits)
+}
 
 /// The texels or the places of one sample, in the order of their first read. A sample has one of the
 /// two kinds only.
@@ -71,7 +99,7 @@ impl Reads {
 }
 
 /// At most 128 entries: sixteen probes of four texels in two mips.
-fn number<T: PartialEq>(entries: &mut Vec<T>, entry: T) -> usize {
+pub(super) fn number<T: PartialEq>(entries: &mut Vec<T>, entry: T) -> usize {
     entries.iter().position(|e| *e == entry).unwrap_or_else(|| {
         entries.push(entry);
         entries.len() - 1
