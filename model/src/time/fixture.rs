@@ -171,6 +171,17 @@ pub(super) fn asset(sketch: &Sketch) -> Asset {
     .unwrap()
 }
 
+/// The same asset with integer weights of so many bits.
+pub(super) fn with_weight_bits(asset: Asset, bits: u8) -> Asset {
+    let mut parts = asset.into_parts();
+    for layer in &mut parts.layers {
+        if let Parameters::Integer(numbers) = &mut layer.parameters {
+            numbers.weight_bits = bits;
+        }
+    }
+    Asset::new(parts).unwrap()
+}
+
 /// What is asked of an asset's program.
 #[derive(Clone, Debug)]
 pub(super) enum Asked {

@@ -32,8 +32,10 @@ struct Looked {
     /// Start and end of the tags' cycles for the fetch.
     start: u64,
     end: u64,
-    /// A miss register is free, or the lines under way are there, from here on.
+    /// A miss register is free from here on.
     stalled_until: Option<u64>,
+    /// The tags wait for the lines under way.
+    is_blocked: bool,
     /// The fetch has waited for a miss register.
     has_stalled: bool,
     /// The latest line so far.
@@ -105,6 +107,7 @@ impl Lookup {
             start: now,
             end,
             stalled_until: None,
+            is_blocked: false,
             has_stalled: false,
             arrival: Arrival::THERE,
             misses: 0,
@@ -217,7 +220,8 @@ impl Lookup {
             && let Some(last) = self.memory.last().filter(|&last| last > now)
         {
             // The tags take nothing more until the lines are there.
-            looked.stalled_until = Some(last);
+            looked.end = last;
+            looked.is_blocked = true;
             return None;
         }
         let looked = self.looked.take()?;
@@ -234,11 +238,9 @@ impl Lookup {
     pub(super) fn cause(&self, now: u64) -> Option<Cause> {
         let looked = self.looked.as_ref()?;
         Some(if looked.stalled_until.is_some() {
-            if self.is_blocking {
-                Cause::LatentMiss
-            } else {
-                Cause::MshrFull
-            }
+            Cause::MshrFull
+        } else if looked.is_blocked {
+            Cause::LatentMiss
         } else if now == looked.start || looked.has_stalled {
             Cause::Lookup
         } else {

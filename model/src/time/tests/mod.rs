@@ -1,6 +1,7 @@
 //! Claims about whole runs.
 
 mod operands;
+mod parts;
 mod random;
 
 use super::fixture::{
