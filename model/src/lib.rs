@@ -9,6 +9,7 @@
 pub mod demand;
 pub mod engine;
 pub mod exec;
+mod footprint;
 pub mod place;
 pub mod request;
 pub mod sampler;

@@ -39,13 +39,13 @@ impl Reads {
     }
 
     /// Enters a texel; gives its number among the texels.
-    pub(super) fn texel(&mut self, texel: Request) -> usize {
+    pub(crate) fn texel(&mut self, texel: Request) -> usize {
         self.count += 1;
         number(&mut self.texels, texel)
     }
 
     /// Enters a place; gives its number among the places.
-    pub(super) fn place(&mut self, place: Place) -> usize {
+    pub(crate) fn place(&mut self, place: Place) -> usize {
         self.count += 1;
         number(&mut self.places, place)
     }
