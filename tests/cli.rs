@@ -179,6 +179,7 @@ fn the_manual_holds_every_instruction_in_both_forms() {
     for (row, expected) in rows.as_array().unwrap().iter().zip(table) {
         assert_eq!(row["mnemonic"], expected.mnemonic);
         assert!(text.contains(&format!("`{}`", expected.mnemonic)));
+        assert_eq!(row["class"], expected.class.name());
     }
 }
 

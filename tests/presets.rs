@@ -9,8 +9,10 @@ use ntmu::conformance::claims::findings;
 use ntmu::conformance::synthetic::{self, Spec, SpecPrecision};
 use ntmu::isa::layer::Layer;
 use ntmu::isa::layout::Layout;
-use ntmu::isa::{Asset, Program};
+use ntmu::isa::sampler::{Detail, SampleRequest, Sampler};
+use ntmu::isa::{Asset, Program, image};
 use ntmu::model::Request;
+use ntmu::model::exec::Decoder;
 use ntmu::trainer::{self, Precision, Preset, Steps, TrainConfig};
 use std::sync::atomic::AtomicBool;
 
@@ -55,6 +57,44 @@ fn every_preset_keeps_the_claims_in_bytes_and_in_halves() {
             let found = findings(&asset, &some_texels(&asset));
             assert!(found.hold(), "{} {precision:?}: {found:#?}", preset.name);
             assert_eq!(found.overflowing, 0, "{} {precision:?}", preset.name);
+        }
+    }
+}
+
+#[test]
+fn every_presets_programs_return_from_their_images_and_run_alike() {
+    for preset in Preset::ALL {
+        for precision in [Precision::Int8, Precision::Fp16] {
+            let asset = trained(&preset, precision);
+            let texel = Program::compile(&asset, Layout::TILED);
+            let sample = Program::compile_sample(&asset, Layout::TILED);
+            let [texel_again, sample_again] = [&texel, &sample].map(|program| {
+                let bytes = image::write(program.layout(), program.instructions());
+                let (layout, instructions) = image::read(&bytes).unwrap();
+                let linked = Program::link(&asset, layout, instructions).unwrap();
+                assert_eq!(linked, *program, "{} {precision:?}", preset.name);
+                linked
+            });
+            let codes = |program: &Program| -> Vec<Vec<i32>> {
+                let decoder = Decoder::new(&asset, program);
+                let texels = some_texels(&asset).into_iter();
+                texels.map(|texel| decoder.texel(texel, &mut ())).collect()
+            };
+            assert_eq!(codes(&texel), codes(&texel_again));
+            let request = SampleRequest {
+                place: [0.3_f32, 0.7].map(f32::to_bits),
+                detail: Detail::Lod(0.5_f32.to_bits()),
+                random: 0,
+            };
+            let filtered = |program: &Program| {
+                let decoder = Decoder::new(&asset, program);
+                decoder
+                    .sample(&Sampler::default(), &request, &mut ())
+                    .unwrap()
+            };
+            assert_eq!(filtered(&sample), filtered(&sample_again));
+            // Its accumulators are wide enough, whatever the latents.
+            assert_eq!(texel.overflows(&asset), [], "{} {precision:?}", preset.name);
         }
     }
 }

@@ -17,7 +17,8 @@
 //! | [`format`](mod@format) | that asset as bytes: the `.ntx` file |
 //! | [`layout`] | where a unit's memory keeps the grids |
 //! | [`sampler`] | what a request by normalised coordinates means |
-//! | [`instruction`], [`assembly`], [`program`], [`link`] | the microprogram that decodes one texel |
+//! | [`instruction`], [`program`], [`link`] | the microprogram that decodes one texel, or one sample |
+//! | [`assembly`], [`image`], [`manual`] | that program as text and as bytes, and its reference manual |
 //!
 //! Three words never mix: a *code* is packed bits as stored, a *value* is the integer that a code
 //! stands for, a *real* is what the value means. Nothing in this crate computes with floats, except
@@ -35,12 +36,15 @@ pub mod error;
 pub mod filter;
 pub mod format;
 pub mod half;
+pub mod image;
 pub mod instruction;
 pub mod latent;
 pub mod layer;
 pub mod layout;
+mod layout_code;
 pub mod limits;
 pub mod link;
+pub mod manual;
 pub mod position;
 pub mod preset;
 pub mod profile;

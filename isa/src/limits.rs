@@ -31,3 +31,14 @@ pub const MAX_SKIP_SPAN: u8 = 3;
 pub const MAX_TEXT: u32 = 65_536;
 /// Entries of the metadata's tables.
 pub const MAX_ENTRIES: u16 = 1024;
+/// Vector registers of a unit.
+pub const VECTOR_REGISTERS: u16 = 4;
+/// Runs of a loop's body.
+pub const MAX_REPEATS: u16 = 64;
+/// Instructions of a program, as stored.
+pub const MAX_INSTRUCTIONS: u32 = 1024;
+/// Instructions of a program, as executed: loops unrolled, the body of a footprint's loop once. The
+/// compiler's longest program, 64 layers in a sample, has fewer than 300.
+pub const MAX_STEPS: u32 = 4096;
+/// Decodes of one sample, which bound a footprint's loop: sixteen probes of four texels in two mips.
+pub const MAX_DECODES: u32 = 128;

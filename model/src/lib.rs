@@ -10,6 +10,7 @@ pub mod control;
 pub mod demand;
 pub mod engine;
 pub mod exec;
+mod footprint;
 pub mod material;
 pub mod place;
 pub mod request;

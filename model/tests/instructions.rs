@@ -23,6 +23,7 @@ use ntmu_isa::shape::OutputFormat;
 use ntmu_isa::{Asset, Program};
 use ntmu_model::Request;
 use ntmu_model::exec::Decoder;
+use ntmu_model::time::work_of;
 
 const NORMATIVE: Profile = Profile::NORMATIVE;
 
@@ -358,4 +359,67 @@ fn a_rescale_follows_what_was_done_and_not_what_the_layer_says() {
     // 64/2 in 1/256 is 32: 32·(64 + 768) = 26624, / 16 = 1664, which saturates. Its entry is 99.
     assert_eq!(outputs(&whole), [127, 99]);
     assert_eq!(outputs(&plain), [32, 8]);
+}
+
+#[test]
+fn repeat_runs_its_body_on_one_layer_after_the_other() {
+    // l0 is the latent; then times 1, 2, 3, 4 and plus 1 each, in place; then the code.
+    let first = integer(&[&[1, 0, 0]], &[0], power(0), Activation::Identity);
+    let scaled = |weight: i8| integer(&[&[weight]], &[1], power(0), Activation::Identity);
+    let last = integer(&[&[1]], &[0], power(0), Activation::Identity);
+    // Every register holds 16-bit integers: a layer reads any other's.
+    let first = with_integer(first, |p| p.output_bits = 16);
+    let middle = (1..=4).map(|weight| with_integer(scaled(weight), |p| p.output_bits = 16));
+    let layers: Vec<Layer> = [first].into_iter().chain(middle).chain([last]).collect();
+    let asset = of_latent(3, NORMATIVE, layers, OutputFormat::Unorm8);
+    let text = |loop_start: &str, layer: u16| {
+        format!(
+            "position g0\nfetch g0\nposition g1\nfetch g1\nlerp v0, 0, g0\nlerp v0, 1, g1
+             level v0, 2\ndense l0, v0, 3, 1\nrescale l0, v1, 1
+             {loop_start}\ndense l{layer}, v1, 1, 1\nrescale l{layer}, v1, 1\nagain
+             dense l5, v1, 1, 1\nemit l5, 1\nend"
+        )
+    };
+    let run = |text: &str| {
+        let (layout, instructions) = ntmu_isa::assembly::assemble(text).unwrap();
+        let program = Program::link(&asset, layout, instructions).unwrap();
+        let request = Request::new(&asset.shape, 0, 0, 0).unwrap();
+        let taps = Decoder::new(&asset, &program).taps(request);
+        let layers: Vec<u16> = taps.layers.iter().map(|tap| tap.layer).collect();
+        (layers, taps.codes[0])
+    };
+    // 3, 4, 9, 28, 113.
+    assert_eq!(run(&text("repeat 4, 1", 1)), (vec![0, 1, 2, 3, 4, 5], 113));
+    // 3, 7, 29.
+    assert_eq!(run(&text("repeat 2, 2", 2)), (vec![0, 2, 4, 5], 29));
+    // 3, 7, 15, 31, 63.
+    assert_eq!(run(&text("repeat 4, 0", 2)), (vec![0, 2, 2, 2, 2, 5], 63));
+}
+
+#[test]
+fn a_loop_is_the_work_of_its_runs() {
+    let first = integer(
+        &[&[1, 0, 0], &[0, 1, 0]],
+        &[0, 0],
+        power(0),
+        Activation::Identity,
+    );
+    let same = integer(&[&[1, 2], &[3, 4]], &[5, 6], power(2), Activation::Relu);
+    let last = integer(&[&[1, 1]], &[0], power(0), Activation::Identity);
+    let mut layers = vec![first];
+    layers.extend(vec![same; 6]);
+    layers.push(last);
+    let asset = of_latent(3, NORMATIVE, layers, OutputFormat::Unorm8);
+    let program = Program::compile(&asset, Layout::LINEAR);
+    assert!(program.instructions().len() < program.steps().len());
+    let straight = program
+        .steps()
+        .iter()
+        .copied()
+        .filter(|step| !matches!(step, Instruction::Repeat { .. } | Instruction::Again {}));
+    let straight = Program::link(&asset, Layout::LINEAR, straight.collect()).unwrap();
+    let sample = Program::compile_sample(&asset, Layout::LINEAR);
+    let work = work_of(&asset, &straight);
+    assert_eq!(work_of(&asset, &program), work);
+    assert_eq!(work_of(&asset, &sample), work);
 }

@@ -1,13 +1,16 @@
 //! The verbs, one file each.
 
+mod asm;
 mod certify;
 mod compare;
 mod conform;
 mod convert;
 mod decode;
+mod disasm;
 mod encode;
 mod generate;
 mod info;
+mod microprogram;
 mod profile;
 mod program;
 mod sample;
@@ -46,8 +49,12 @@ enum Verb {
     Sample(sample::Sample),
     /// Prove what holds for every latent and texel: accumulator widths, safe rescalings, distances.
     Certify(certify::Certify),
-    /// Print the microprogram of an asset.
+    /// Print the microprogram of an asset, and what is proven of it.
     Program(program::Program),
+    /// Turn assembly into a program image.
+    Asm(asm::Asm),
+    /// Turn a program image, or words, into assembly.
+    Disasm(disasm::Disasm),
     /// Compare an asset, or a decoded folder, with its source.
     Compare(compare::Compare),
     /// Write an asset in other numbers: fewer bits, fp16, another profile.
@@ -74,6 +81,8 @@ impl Arguments {
             Verb::Sample(verb) => verb.run(json),
             Verb::Certify(verb) => verb.run(json),
             Verb::Program(verb) => verb.run(json),
+            Verb::Asm(verb) => verb.run(json),
+            Verb::Disasm(verb) => verb.run(json),
             Verb::Compare(verb) => verb.run(json),
             Verb::Conform(verb) => verb.run(json),
             Verb::Convert(verb) => verb.run(json),

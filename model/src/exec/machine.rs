@@ -1,5 +1,6 @@
 //! Machine: the registers of the unit, and what every instruction does to them.
 
+use super::filter::Filter;
 use super::layer::Held;
 use super::position::Corners;
 use super::{Decoder, Probe, embed, half, interpolate, layer, output, position};
@@ -9,6 +10,7 @@ use ntmu_isa::embed::Wave;
 use ntmu_isa::instruction::{Instruction, VECTOR_COUNT};
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer};
 use ntmu_isa::position::PHASE_BITS;
+use std::ops::Range;
 
 /// Lanes of a register, and accumulators of a unit.
 const LANES: usize = ntmu_isa::limits::MAX_LANES as usize;
@@ -27,6 +29,8 @@ pub(super) struct Machine<'d, 'a> {
     sums: Vec<f32>,
     summed: u16,
     emitted: Vec<i32>,
+    /// There while a sample is under way.
+    filter: Option<Filter<'d>>,
 }
 
 impl<'d, 'a> Machine<'d, 'a> {
@@ -41,6 +45,7 @@ impl<'d, 'a> Machine<'d, 'a> {
             sums: vec![0.0; LANES],
             summed: 0,
             emitted: vec![0; decoder.asset.shape.outputs.len()],
+            filter: None,
         }
     }
 
@@ -49,9 +54,35 @@ impl<'d, 'a> Machine<'d, 'a> {
     }
 
     pub(super) fn run(&mut self, place: &Place, phase_bits: u8, probe: &mut impl Probe) -> &[i32] {
-        for instruction in self.decoder.program.instructions() {
+        for instruction in self.decoder.program.steps() {
             self.step(instruction, place, phase_bits, probe);
         }
+        &self.emitted
+    }
+
+    /// A sample, by a program with this loop of its footprint.
+    pub(super) fn sample(
+        &mut self,
+        filter: Filter<'d>,
+        body: Range<usize>,
+        probe: &mut impl Probe,
+    ) -> &[i32] {
+        self.filter = Some(filter);
+        let steps = self.decoder.program.steps();
+        // Nothing outside the loop asks where it is.
+        let nowhere = Place::of(Request::within(0, 0, 0));
+        for instruction in &steps[..body.start] {
+            self.step(instruction, &nowhere, PHASE_BITS, probe);
+        }
+        while let Some((place, phase_bits)) = self.filter.as_ref().and_then(Filter::next) {
+            for instruction in &steps[body.clone()] {
+                self.step(instruction, &place, phase_bits, probe);
+            }
+        }
+        for instruction in &steps[body.end..] {
+            self.step(instruction, &nowhere, PHASE_BITS, probe);
+        }
+        self.filter = None;
         &self.emitted
     }
 
@@ -167,13 +198,12 @@ impl<'d, 'a> Machine<'d, 'a> {
                 outputs,
             } => self.rescale(layer, Some(skip), dst, outputs, probe),
             Instruction::Emit { layer, outputs } => {
-                let Some((_, parameters)) = self.integer(layer) else {
-                    return;
-                };
-                let accumulators = &self.accumulators[..usize::from(outputs)];
-                let (formats, codes) = (&asset.shape.outputs, &mut self.emitted);
-                output::emit(accumulators, parameters, formats, profile.output, codes);
-                probe.emitted(codes);
+                self.codes(layer, outputs);
+                probe.emitted(&self.emitted);
+            }
+            Instruction::Collect { layer, outputs } => {
+                self.codes(layer, outputs);
+                self.collect(probe);
             }
             Instruction::DenseHalf {
                 layer,
@@ -228,11 +258,68 @@ impl<'d, 'a> Machine<'d, 'a> {
                 probe.outputs(layer, lanes);
             }
             Instruction::EmitHalf { outputs } => {
-                let sums = &self.sums[..usize::from(outputs)];
-                half::emit(sums, &asset.shape.outputs, profile, &mut self.emitted);
+                self.half_codes(outputs);
                 probe.emitted(&self.emitted);
             }
-            Instruction::End {} => {}
+            Instruction::CollectHalf { outputs } => {
+                self.half_codes(outputs);
+                self.collect(probe);
+            }
+            Instruction::Footprint {} => {
+                if let Some(filter) = &mut self.filter {
+                    filter.plan();
+                }
+            }
+            Instruction::Blend { outputs: _ } => {
+                // Without a sample under way, the footprint is the one texel that was decoded.
+                if let Some(codes) = self.filter.as_ref().and_then(Filter::blend) {
+                    self.emitted = codes;
+                }
+                probe.emitted(&self.emitted);
+            }
+            // The steps are in the order of execution.
+            Instruction::Repeat { times: _, step: _ }
+            | Instruction::Again {}
+            | Instruction::Each {}
+            | Instruction::Next {}
+            | Instruction::End {} => {}
+        }
+    }
+
+    /// Codes from the accumulators.
+    fn codes(&mut self, layer: u16, outputs: u16) {
+        let Some((_, parameters)) = self.integer(layer) else {
+            return;
+        };
+        let asset = self.decoder.asset;
+        let accumulators = &self.accumulators[..usize::from(outputs)];
+        let (formats, codes) = (&asset.shape.outputs, &mut self.emitted);
+        output::emit(
+            accumulators,
+            parameters,
+            formats,
+            asset.profile.output,
+            codes,
+        );
+    }
+
+    /// Codes from an fp16 layer's sums.
+    fn half_codes(&mut self, outputs: u16) {
+        let asset = self.decoder.asset;
+        let sums = &self.sums[..usize::from(outputs)];
+        half::emit(
+            sums,
+            &asset.shape.outputs,
+            &asset.profile,
+            &mut self.emitted,
+        );
+    }
+
+    /// The codes of a decode to the filter's buffer.
+    fn collect(&mut self, probe: &mut impl Probe) {
+        probe.collected(&self.emitted);
+        if let Some(filter) = &mut self.filter {
+            filter.collect(&self.emitted);
         }
     }
 

@@ -6,6 +6,7 @@
 mod dense;
 mod embed;
 mod fetch;
+mod filter;
 mod half;
 mod image;
 mod interpolate;
@@ -17,6 +18,7 @@ mod probe;
 mod taps;
 mod tracer;
 
+pub use filter::SampleError;
 pub use position::Corners;
 pub use probe::Probe;
 pub use taps::{GridTap, LayerTap, Taps};
@@ -27,9 +29,11 @@ use crate::request::Request;
 use crate::trace::{Fetch, Trace};
 use dense::Weights;
 use fetch::Memory;
+use filter::Filter;
 use machine::Machine;
 use ntmu_isa::instruction::Instruction;
 use ntmu_isa::position::PHASE_BITS;
+use ntmu_isa::sampler::{SampleRequest, Sampler};
 use ntmu_isa::{Asset, Program};
 
 /// A unit that holds one asset and runs one program.
@@ -63,7 +67,8 @@ impl<'a> Decoder<'a> {
         self.asset
     }
 
-    /// The channel codes of one texel; `probe` sees every intermediate value.
+    /// The channel codes of one texel; `probe` sees every intermediate value. A program that filters
+    /// decodes it as a footprint of its own.
     ///
     /// The decode of its centre, with phases of [`PHASE_BITS`]. The request must come from the
     /// asset's own shape.
@@ -80,6 +85,26 @@ impl<'a> Decoder<'a> {
     pub fn place(&self, place: &Place, probe: &mut impl Probe) -> Vec<i32> {
         let phase_bits = self.asset.profile.subtexel_bits;
         Machine::new(self).run(place, phase_bits, probe).to_vec()
+    }
+
+    /// One sample: the codes of the footprint's decodes, filtered by the sampler's state, which must
+    /// equal those of [`Texture::sample`](crate::sampler::Texture::sample). `probe` sees every decode.
+    ///
+    /// # Errors
+    /// When the program does not filter, or the sampler does not fit the asset.
+    pub fn sample(
+        &self,
+        sampler: &Sampler,
+        request: &SampleRequest,
+        probe: &mut impl Probe,
+    ) -> Result<Vec<i32>, SampleError> {
+        let body = self.program.footprint_loop().ok_or(SampleError::Program)?;
+        sampler
+            .check(&self.asset.shape)
+            .map_err(SampleError::Sampler)?;
+        let filter = Filter::new(self.asset, sampler, request);
+        let codes = Machine::new(self).sample(filter, body, probe).to_vec();
+        Ok(codes)
     }
 
     /// Everything that one texel makes visible on its way.
@@ -105,7 +130,7 @@ impl<'a> Decoder<'a> {
         let mut machine = Machine::new(self);
         let mut trace = Trace::new();
         for place in places {
-            for instruction in self.program.instructions() {
+            for instruction in self.program.steps() {
                 if let Instruction::Position { .. } | Instruction::Fetch { .. } = instruction {
                     machine.step(instruction, &place, PHASE_BITS, &mut trace);
                 }

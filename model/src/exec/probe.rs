@@ -27,7 +27,9 @@ pub trait Probe {
     fn activated_sums(&mut self, _sums: &[f32]) {}
     /// What a hidden layer writes to its register: integers, or the bits of halves.
     fn outputs(&mut self, _layer: u16, _values: &[i16]) {}
-    /// The channel codes.
+    /// The channel codes of one decode of a sample, on their way to the filter.
+    fn collected(&mut self, _codes: &[i32]) {}
+    /// The channel codes that leave the unit.
     fn emitted(&mut self, _codes: &[i32]) {}
 }
 

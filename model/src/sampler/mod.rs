@@ -4,21 +4,20 @@
 //! place once per sample, and their codes blended. Whatever decodes can stand behind it: see
 //! [`Decode`].
 
-mod reads;
+pub(crate) mod reads;
 mod sampled;
 
+pub use crate::footprint::Probes;
 pub use reads::Reads;
 pub use sampled::Sampled;
 
 use crate::exec::Decoder;
+use crate::footprint::Footprint;
 use crate::place::Place;
 use crate::request::Request;
 use ntmu_isa::profile::Profile;
-use ntmu_isa::sampler::blend::{Corners, blend};
-use ntmu_isa::sampler::plan::{Probe, Spot, Square};
-use ntmu_isa::sampler::{Order, SampleRequest, Sampler, SamplerError};
+use ntmu_isa::sampler::{SampleRequest, Sampler, SamplerError};
 use ntmu_isa::shape::Shape;
-use reads::{Corner, corners, place_of};
 
 /// What decodes texels and places of one asset.
 ///
@@ -62,15 +61,6 @@ impl Decode for Decoder<'_> {
 pub struct Texture<'s, S: Decode> {
     source: &'s S,
     sampler: Sampler,
-}
-
-/// The probes of a sample: where it read, and with which weights.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Probes {
-    /// Texels, decoded and then filtered.
-    Squares(Vec<Probe<Square>>),
-    /// Places, where latents were filtered and then decoded.
-    Spots(Vec<Probe<Spot>>),
 }
 
 /// What a sample gave, and what it took.
@@ -120,82 +110,57 @@ impl<'s, S: Decode> Texture<'s, S> {
     /// Where a sample reads, and with which weights; nothing is decoded.
     #[must_use]
     pub fn probes(&self, request: &SampleRequest) -> Probes {
-        let (shape, profile) = (self.source.shape(), self.source.profile());
-        match self.sampler.order {
-            Order::DecodeThenFilter => {
-                Probes::Squares(request.squares(&self.sampler, shape, profile))
-            }
-            Order::FilterThenDecode => Probes::Spots(request.spots(&self.sampler, shape, profile)),
-        }
+        self.footprint(request).probes
     }
 
     /// The texels and places that a sample decodes, each once, in the order of their first read:
     /// what a trace of the unit is made from.
     #[must_use]
     pub fn reads(&self, request: &SampleRequest) -> Reads {
-        let mut reads = Reads::default();
-        self.read(&self.probes(request), &mut reads);
-        reads
+        self.footprint(request).reads
     }
 
     /// One sample.
     #[must_use]
     pub fn sample(&self, request: &SampleRequest) -> Sample {
-        let pending = self.pending(request);
-        let decoded = pending.reads.decode(self.source);
-        self.blended(pending, &decoded)
+        let footprint = self.footprint(request);
+        let decoded = footprint.reads.decode(self.source);
+        self.blended(footprint, &decoded)
     }
 
     /// Samples, with one call to the source for all of them. Equal reads are joined within a sample,
     /// not among samples: the unit has no memory of codes.
     #[must_use]
     pub fn samples(&self, requests: &[SampleRequest]) -> Vec<Sample> {
-        let pending: Vec<Pending> = requests.iter().map(|r| self.pending(r)).collect();
-        let all = Reads::concatenated(pending.iter().map(|p| &p.reads));
+        let footprints: Vec<Footprint> = requests.iter().map(|r| self.footprint(r)).collect();
+        let all = Reads::concatenated(footprints.iter().map(|f| &f.reads));
         let mut decoded = all.decode(self.source).into_iter();
-        pending
+        footprints
             .into_iter()
-            .map(|pending| {
-                let own = pending.reads.decodes() as usize;
+            .map(|footprint| {
+                let own = footprint.reads.decodes() as usize;
                 let own: Vec<Vec<i32>> = decoded.by_ref().take(own).collect();
-                self.blended(pending, &own)
+                self.blended(footprint, &own)
             })
             .collect()
     }
 
-    fn pending(&self, request: &SampleRequest) -> Pending {
-        let probes = self.probes(request);
-        let mut reads = Reads::default();
-        let slots = self.read(&probes, &mut reads);
-        Pending {
-            probes,
-            reads,
-            slots,
-        }
+    fn footprint(&self, request: &SampleRequest) -> Footprint {
+        Footprint::of(
+            request,
+            &self.sampler,
+            self.source.shape(),
+            self.source.profile(),
+        )
     }
 
-    fn blended(&self, pending: Pending, decoded: &[Vec<i32>]) -> Sample {
-        let formats = self.source.shape().outputs.iter().enumerate();
-        let codes = formats
-            .map(|(channel, &format)| {
-                let corners = |corners: Slots| Corners {
-                    codes: corners.slots.map(|slot| match slot {
-                        Slot::Decoded(index) => decoded[index][channel],
-                        Slot::Border => self.border(channel),
-                        Slot::Unread => 0,
-                    }),
-                    fractions: corners.fractions,
-                };
-                let slots = pending.slots.iter();
-                let probes: Vec<Probe<Corners>> = slots.map(|probe| probe.map(corners)).collect();
-                blend(&probes, format, self.source.profile())
-            })
-            .collect();
+    fn blended(&self, footprint: Footprint, decoded: &[Vec<i32>]) -> Sample {
+        let (shape, profile) = (self.source.shape(), self.source.profile());
         Sample {
-            codes,
-            reads: pending.reads.count(),
-            decodes: pending.reads.decodes(),
-            probes: pending.probes,
+            codes: footprint.blend(decoded, &self.sampler.border, shape, profile),
+            reads: footprint.reads.count(),
+            decodes: footprint.reads.decodes(),
+            probes: footprint.probes,
         }
     }
 
@@ -227,67 +192,6 @@ impl<'s, S: Decode> Texture<'s, S> {
     /// The border's code; there is one for every channel where a texel can be the border.
     fn border(&self, channel: usize) -> i32 {
         self.sampler.border.get(channel).copied().unwrap_or(0)
-    }
-
-    /// Enters what the probes read, and says where it will be found.
-    fn read(&self, probes: &Probes, reads: &mut Reads) -> Vec<Probe<Slots>> {
-        let profile = self.source.profile();
-        match probes {
-            Probes::Squares(probes) => probes
-                .iter()
-                .map(|probe| probe.map(|square| Slots::of_square(&square, reads)))
-                .collect(),
-            Probes::Spots(probes) => probes
-                .iter()
-                .map(|probe| probe.map(|spot| Slots::of_spot(&spot, profile, reads)))
-                .collect(),
-        }
-    }
-}
-
-/// A sample whose codes are not there yet.
-struct Pending {
-    probes: Probes,
-    reads: Reads,
-    slots: Vec<Probe<Slots>>,
-}
-
-/// Where a code comes from.
-#[derive(Clone, Copy)]
-enum Slot {
-    /// What was decoded, by its number.
-    Decoded(usize),
-    /// The border.
-    Border,
-    /// Nothing: it has no weight.
-    Unread,
-}
-
-/// Where the codes of four corners come from.
-#[derive(Clone, Copy)]
-struct Slots {
-    slots: [Slot; 4],
-    fractions: [u32; 2],
-}
-
-impl Slots {
-    fn of_square(square: &Square, reads: &mut Reads) -> Slots {
-        let slots = corners(square).map(|corner| match corner {
-            Corner::Texel(texel) => Slot::Decoded(reads.texel(texel)),
-            Corner::Border => Slot::Border,
-            Corner::Unread => Slot::Unread,
-        });
-        Slots {
-            slots,
-            fractions: square.fractions,
-        }
-    }
-
-    fn of_spot(spot: &Spot, profile: &Profile, reads: &mut Reads) -> Slots {
-        Slots {
-            slots: [Slot::Decoded(reads.place(place_of(spot, profile))); 4],
-            fractions: [0; 2],
-        }
     }
 }
 

@@ -8,7 +8,7 @@ use ntmu_isa::sampler::plan::{Spot, Square};
 
 /// What one corner of a square takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Corner {
+pub(crate) enum Corner {
     /// A decode.
     Texel(Request),
     /// The sampler's border codes: no decode.
@@ -18,7 +18,7 @@ pub(super) enum Corner {
 }
 
 /// What the corners (0,0), (1,0), (0,1) and (1,1) of a square take.
-pub(super) fn corners(square: &Square) -> [Corner; 4] {
+pub(crate) fn corners(square: &Square) -> [Corner; 4] {
     [0, 1, 2, 3].map(|corner| match square.corner(corner) {
         _ if !square.counts(corner) => Corner::Unread,
         Some((x, y)) => Corner::Texel(Request::within(x, y, square.mip)),
@@ -27,7 +27,7 @@ pub(super) fn corners(square: &Square) -> [Corner; 4] {
 }
 
 /// The decode of a spot.
-pub(super) fn place_of(spot: &Spot, profile: &Profile) -> Place {
+pub(crate) fn place_of(spot: &Spot, profile: &Profile) -> Place {
     let (bits, lod_bits) = (profile.subtexel_bits, profile.lod_bits);
     Place::within(spot.coordinates, bits, spot.mip, spot.lod, lod_bits)
 }
@@ -67,13 +67,13 @@ impl Reads {
     }
 
     /// Enters a texel; gives its number among the texels.
-    pub(super) fn texel(&mut self, texel: Request) -> usize {
+    pub(crate) fn texel(&mut self, texel: Request) -> usize {
         self.count += 1;
         number(&mut self.texels, texel)
     }
 
     /// Enters a place; gives its number among the places.
-    pub(super) fn place(&mut self, place: Place) -> usize {
+    pub(crate) fn place(&mut self, place: Place) -> usize {
         self.count += 1;
         number(&mut self.places, place)
     }

@@ -2,7 +2,7 @@ use super::*;
 use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::position::{AddressMode, CornerSnap};
-use ntmu_isa::sampler::{Address, Detail, Filter, Footprint, MipBlend, MipFilter};
+use ntmu_isa::sampler::{Address, Detail, Filter, Footprint, MipBlend, MipFilter, Order};
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling};
 use std::cell::RefCell;
 

@@ -89,7 +89,7 @@ const RESCALE_SLOTS: u32 = 1;
 pub fn work_of(asset: &Asset, program: &Program) -> Work {
     let mut work = Work::default();
     let channels = |grid: u16| u32::from(asset.shape.grids[usize::from(grid)].channels);
-    for instruction in program.instructions() {
+    for instruction in program.steps() {
         match *instruction {
             Instruction::Position { grid: _ } => work.positions += 1,
             Instruction::Fetch { grid } => {
@@ -184,11 +184,21 @@ pub fn work_of(asset: &Asset, program: &Program) -> Work {
                 work.read_skip(outputs);
             }
             Instruction::SkipHalf { skip: _, outputs } => work.read_skip(outputs),
-            Instruction::Emit { layer: _, outputs } | Instruction::EmitHalf { outputs } => {
+            Instruction::Emit { layer: _, outputs }
+            | Instruction::EmitHalf { outputs }
+            | Instruction::Collect { layer: _, outputs }
+            | Instruction::CollectHalf { outputs } => {
                 work.requantize(RESCALE_SLOTS, outputs);
                 work.channels += u32::from(outputs);
             }
-            Instruction::End {} => {}
+            // The footprint and the filter are no decode's; control takes no resource.
+            Instruction::Footprint {}
+            | Instruction::Blend { outputs: _ }
+            | Instruction::Repeat { times: _, step: _ }
+            | Instruction::Again {}
+            | Instruction::Each {}
+            | Instruction::Next {}
+            | Instruction::End {} => {}
         }
     }
     work

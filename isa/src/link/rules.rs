@@ -1,123 +1,31 @@
-//! Link: whether instructions from elsewhere fit an asset.
-//!
-//! A program that passes reads nothing before it is written and no operand is out of range, so
-//! running it cannot fail. What it computes is its author's business.
+//! Rules: what every instruction needs, and what it leaves.
 
+use super::{Linker, Sums};
 use crate::activation::Activation;
-use crate::asset::Asset;
 use crate::embed::WAVES_PER_OCTAVE;
-use crate::instruction::{Instruction, VECTOR_COUNT};
+use crate::instruction::Instruction;
 use crate::layer::{Layer, Parameters};
 use crate::shape::LaneFormat;
-use std::fmt;
 
-/// Why instructions do not fit an asset.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LinkError {
-    /// The instruction, from 0.
-    pub at: usize,
-    /// What was found there.
-    pub found: String,
-    /// What is allowed there.
-    pub allowed: String,
-}
-
-impl fmt::Display for LinkError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "instruction {}: found {}; allowed: {}",
-            self.at, self.found, self.allowed
-        )
-    }
-}
-
-impl std::error::Error for LinkError {}
-
-/// Follows the instructions once and checks each against what the unit holds before it.
-pub(crate) fn check(asset: &Asset, instructions: &[Instruction]) -> Result<(), LinkError> {
-    Linker::new(asset).run(instructions)
-}
-
-/// What each stage of the unit holds while a program is followed.
-struct Linker<'a> {
-    asset: &'a Asset,
-    positioned: [bool; 2],
-    fetched: [bool; 2],
-    /// Lanes written of each vector register, from lane 0 without a gap.
-    lanes: [u32; VECTOR_COUNT as usize],
-    /// What the lanes hold.
-    formats: [LaneFormat; VECTOR_COUNT as usize],
-    sums: Option<Sums>,
-    emitted: bool,
-}
-
-/// The accumulators that are held.
-#[derive(Clone, Copy)]
-struct Sums {
-    layer: u16,
-    rows: u16,
-    is_half: bool,
-}
+/// What was found, and what is allowed.
+type Refusal = (String, String);
 
 impl<'a> Linker<'a> {
-    fn new(asset: &'a Asset) -> Linker<'a> {
-        Linker {
-            asset,
-            positioned: [false; 2],
-            fetched: [false; 2],
-            lanes: [0; VECTOR_COUNT as usize],
-            formats: [asset.shape.input_format(); VECTOR_COUNT as usize],
-            sums: None,
-            emitted: false,
-        }
-    }
-
-    fn run(mut self, instructions: &[Instruction]) -> Result<(), LinkError> {
-        for (at, instruction) in instructions.iter().enumerate() {
-            let row = instruction.row();
-            for (field, number) in row.operands.iter().zip(instruction.operands()) {
-                if number > field.max() {
-                    let allowed = format!("{}: 0 to {}", field.name, field.max());
-                    return Err(LinkError {
-                        at,
-                        found: number.to_string(),
-                        allowed,
-                    });
-                }
-            }
-            let is_last = at + 1 == instructions.len();
-            if matches!(instruction, Instruction::End {}) != is_last {
-                let found = row.mnemonic.to_owned();
-                let allowed = "`end` as the last instruction and nowhere else".to_owned();
-                return Err(LinkError { at, found, allowed });
-            }
-            self.step(instruction)
-                .map_err(|(found, allowed)| LinkError { at, found, allowed })?;
-        }
-        if self.emitted {
-            Ok(())
-        } else {
-            let allowed = "a program that emits, then ends".to_owned();
-            Err(LinkError {
-                at: instructions.len(),
-                found: "no `emit`".to_owned(),
-                allowed,
-            })
-        }
-    }
-
-    fn step(&mut self, instruction: &Instruction) -> Result<(), (String, String)> {
+    /// Checks an instruction against what the unit holds before it, and does it.
+    pub(super) fn step(&mut self, instruction: &Instruction) -> Result<(), Refusal> {
         let shape = &self.asset.shape;
         match *instruction {
-            Instruction::Position { grid } => self.positioned[usize::from(grid)] = true,
+            Instruction::Position { grid } => {
+                self.place("position")?;
+                self.state.positioned[usize::from(grid)] = true;
+            }
             Instruction::Fetch { grid } => {
                 require(
-                    self.positioned[usize::from(grid)],
+                    self.state.positioned[usize::from(grid)],
                     "fetch",
                     "after `position` of the grid",
                 )?;
-                self.fetched[usize::from(grid)] = true;
+                self.state.fetched[usize::from(grid)] = true;
             }
             Instruction::Concat { dst, lane, grid } => {
                 self.fetched(grid, "concat")?;
@@ -130,9 +38,13 @@ impl<'a> Linker<'a> {
                 self.write(dst, lane, u32::from(channels))?;
             }
             Instruction::Wave { dst, lane, octaves } | Instruction::Saw { dst, lane, octaves } => {
+                self.place(instruction.row().mnemonic)?;
                 self.write(dst, lane, u32::from(WAVES_PER_OCTAVE * octaves))?;
             }
-            Instruction::Level { dst, lane } => self.write(dst, lane, 1)?,
+            Instruction::Level { dst, lane } => {
+                self.place("level")?;
+                self.write(dst, lane, 1)?;
+            }
             Instruction::Zero { dst, lane, lanes } => self.write(dst, lane, u32::from(lanes))?,
             Instruction::Dense {
                 layer,
@@ -225,14 +137,39 @@ impl<'a> Linker<'a> {
                 self.holds(None, outputs, true)?;
                 self.emit(outputs)?;
             }
-            Instruction::End {} => {}
+            Instruction::Collect { layer, outputs } => {
+                self.holds(Some(layer), outputs, false)?;
+                self.collect(outputs)?;
+            }
+            Instruction::CollectHalf { outputs } => {
+                self.holds(None, outputs, true)?;
+                self.collect(outputs)?;
+            }
+            Instruction::Footprint {} => {
+                require(self.filters, "footprint", "in a program with `each`")?;
+                let allowed = "once, before `each`";
+                require(!self.has_place && !self.state.planned, "footprint", allowed)?;
+                self.state.planned = true;
+            }
+            Instruction::Each {} => require(self.state.planned, "each", "after `footprint`")?,
+            Instruction::Blend { outputs } => {
+                let allowed = "once, after the loop of the footprint";
+                require(self.is_behind && !self.state.sent, "blend", allowed)?;
+                self.channels(outputs)?;
+                self.state.sent = true;
+            }
+            // Loops were matched when they were unrolled.
+            Instruction::Repeat { .. }
+            | Instruction::Again {}
+            | Instruction::Next {}
+            | Instruction::End {} => {}
         }
         Ok(())
     }
 
-    fn fetched(&self, grid: u16, mnemonic: &str) -> Result<(), (String, String)> {
+    fn fetched(&self, grid: u16, mnemonic: &str) -> Result<(), Refusal> {
         require(
-            self.fetched[usize::from(grid)],
+            self.state.fetched[usize::from(grid)],
             mnemonic,
             "after `fetch` of the grid",
         )
@@ -244,7 +181,7 @@ impl<'a> Linker<'a> {
         src: u16,
         sizes: (u16, u16),
         is_half: bool,
-    ) -> Result<(), (String, String)> {
+    ) -> Result<(), Refusal> {
         let parameters = self.layer(layer)?;
         require(
             matches!(parameters.parameters, Parameters::Half(_)) == is_half,
@@ -258,7 +195,7 @@ impl<'a> Linker<'a> {
             format!("{} and {}, the layer's", expected.0, expected.1),
         )?;
         self.reads(src, sizes.0, self.asset.input_format(usize::from(layer)))?;
-        self.sums = Some(Sums {
+        self.state.sums = Some(Sums {
             layer,
             rows: sizes.1,
             is_half,
@@ -267,8 +204,11 @@ impl<'a> Linker<'a> {
     }
 
     /// A register with at least so many lanes of a format.
-    fn reads(&self, src: u16, lanes: u16, format: LaneFormat) -> Result<(), (String, String)> {
-        let (held, found) = (self.lanes[usize::from(src)], self.formats[usize::from(src)]);
+    fn reads(&self, src: u16, lanes: u16, format: LaneFormat) -> Result<(), Refusal> {
+        let (held, found) = (
+            self.state.lanes[usize::from(src)],
+            self.state.formats[usize::from(src)],
+        );
         require(
             held >= u32::from(lanes),
             format!("v{src} with {held} lanes written"),
@@ -282,7 +222,7 @@ impl<'a> Linker<'a> {
     }
 
     /// The source of a layer's skip path.
-    fn skip(&self, layer: u16, skip: u16, outputs: u16) -> Result<(), (String, String)> {
+    fn skip(&self, layer: u16, skip: u16, outputs: u16) -> Result<(), Refusal> {
         self.layer(layer)?;
         match self.asset.skip_source(usize::from(layer)) {
             Some(source) => {
@@ -298,36 +238,49 @@ impl<'a> Linker<'a> {
     }
 
     /// The held accumulators become a layer's outputs.
-    fn put(&mut self, layer: u16, dst: u16, outputs: u16) -> Result<(), (String, String)> {
-        self.lanes[usize::from(dst)] = u32::from(outputs);
-        self.formats[usize::from(dst)] = self.layer(layer)?.output_format();
-        self.sums = None;
+    fn put(&mut self, layer: u16, dst: u16, outputs: u16) -> Result<(), Refusal> {
+        self.state.lanes[usize::from(dst)] = u32::from(outputs);
+        self.state.formats[usize::from(dst)] = self.layer(layer)?.output_format();
+        self.state.sums = None;
         Ok(())
     }
 
-    fn emit(&mut self, outputs: u16) -> Result<(), (String, String)> {
+    fn emit(&mut self, outputs: u16) -> Result<(), Refusal> {
+        require(!self.filters, "emit", "`collect` in a program that filters")?;
+        require(!self.state.sent, "emit", "one `emit` in a program")?;
+        self.channels(outputs)?;
+        self.state.sums = None;
+        self.state.sent = true;
+        Ok(())
+    }
+
+    fn collect(&mut self, outputs: u16) -> Result<(), Refusal> {
+        let is_inside = self.filters && self.has_place;
+        require(is_inside, "collect", "in the loop of a footprint")?;
+        require(!self.state.collected, "collect", "one `collect` in a loop")?;
+        self.channels(outputs)?;
+        self.state.sums = None;
+        self.state.collected = true;
+        Ok(())
+    }
+
+    fn channels(&self, outputs: u16) -> Result<(), Refusal> {
         let channels = self.asset.shape.channel_count();
-        require(
-            outputs == channels,
-            format!("{outputs} outputs"),
-            format!("{channels}"),
-        )?;
-        self.sums = None;
-        self.emitted = true;
-        Ok(())
+        let found = format!("{outputs} outputs");
+        require(outputs == channels, found, format!("{channels}"))
     }
 
-    fn layer(&self, layer: u16) -> Result<&'a Layer, (String, String)> {
+    fn layer(&self, layer: u16) -> Result<&'a Layer, Refusal> {
         let layers = &self.asset.layers;
         layers
             .get(usize::from(layer))
             .ok_or_else(|| (format!("l{layer}"), format!("l0 to l{}", layers.len() - 1)))
     }
 
-    fn write(&mut self, dst: u16, lane: u16, lanes: u32) -> Result<(), (String, String)> {
+    fn write(&mut self, dst: u16, lane: u16, lanes: u32) -> Result<(), Refusal> {
         let format = self.asset.shape.input_format();
-        let held = &mut self.lanes[usize::from(dst)];
-        if std::mem::replace(&mut self.formats[usize::from(dst)], format) != format {
+        let held = &mut self.state.lanes[usize::from(dst)];
+        if std::mem::replace(&mut self.state.formats[usize::from(dst)], format) != format {
             *held = 0;
         }
         require(
@@ -346,22 +299,20 @@ impl<'a> Linker<'a> {
 
     /// The held accumulators, if they are `outputs` of the kind, and of the layer where one is
     /// named.
-    fn holds(
-        &self,
-        layer: Option<u16>,
-        outputs: u16,
-        is_half: bool,
-    ) -> Result<Sums, (String, String)> {
+    fn holds(&self, layer: Option<u16>, outputs: u16, is_half: bool) -> Result<Sums, Refusal> {
         let kind = |is_half| if is_half { "fp16 sums" } else { "accumulators" };
-        let fitting = self.sums.filter(|sums| {
+        let fitting = self.state.sums.filter(|sums| {
             sums.rows == outputs
                 && sums.is_half == is_half
                 && layer.is_none_or(|layer| layer == sums.layer)
         });
         fitting.ok_or_else(|| {
-            let held = self.sums.map_or("no accumulators".to_owned(), |sums| {
-                format!("{} {} of l{}", sums.rows, kind(sums.is_half), sums.layer)
-            });
+            let held = self
+                .state
+                .sums
+                .map_or("no accumulators".to_owned(), |sums| {
+                    format!("{} {} of l{}", sums.rows, kind(sums.is_half), sums.layer)
+                });
             let wanted = layer.map_or(String::new(), |l| format!(" of l{l}"));
             (held, format!("{outputs} {}{wanted}", kind(is_half)))
         })
@@ -377,11 +328,11 @@ fn describe(format: LaneFormat) -> String {
     }
 }
 
-fn require(
+pub(super) fn require(
     holds: bool,
     found: impl Into<String>,
     allowed: impl Into<String>,
-) -> Result<(), (String, String)> {
+) -> Result<(), Refusal> {
     if holds {
         Ok(())
     } else {

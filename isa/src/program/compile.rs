@@ -1,83 +1,75 @@
-//! Program: a microprogram that fits an asset, and the compiler that makes one.
+//! Compile: an asset becomes the instructions that decode one texel of it, or one sample.
 
+use super::fold::fold;
 use crate::activation::Activation;
 use crate::asset::Asset;
 use crate::embed::Wave;
 use crate::instruction::{Instruction, VECTOR_COUNT};
 use crate::layer::{HalfParameters, Layer, Parameters};
-use crate::layout::Layout;
-use crate::link::{self, LinkError};
 use crate::shape::Sampling;
 
-/// A microprogram that is known to fit one asset: every operand is in range, nothing is read
-/// before it is written, and it ends.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Program {
-    layout: Layout,
-    instructions: Vec<Instruction>,
+/// What a program is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Purpose {
+    Texel,
+    Sample,
 }
 
-impl Program {
-    /// The program that decodes one texel of an asset.
-    #[must_use]
-    pub fn compile(asset: &Asset, layout: Layout) -> Program {
-        let mut instructions = embed(asset);
-        // Register v0 holds the inputs. A layer writes the register after the one it reads, but
-        // never the one that a skip path still needs.
-        let mut registers = vec![0_u16];
-        for (index, layer) in asset.layers.iter().enumerate() {
-            let live = live_sources(asset, index, &registers);
-            let free = (0..VECTOR_COUNT).find(|register| !live.contains(register));
-            let place = Place {
-                layer: index as u16,
-                src: registers[index],
-                // A span is at most three layers, so at most three sources are live at once.
-                dst: free.unwrap_or(registers[index]),
-                skip: layer
-                    .skip
-                    .map(|skip| registers[index + 1 - usize::from(skip.span)]),
-                is_last: index + 1 == asset.layers.len(),
-            };
-            match &layer.parameters {
-                Parameters::Integer(_) => integer_layer(layer, &place, &mut instructions),
-                Parameters::Half(half) => half_layer(layer, half, &place, &mut instructions),
-            }
-            registers.push(place.dst);
-        }
-        instructions.push(Instruction::End {});
-        Program {
-            layout,
-            instructions,
+/// The instructions for an asset, equal blocks of layers folded into loops.
+pub(super) fn compile(asset: &Asset, purpose: Purpose) -> Vec<Instruction> {
+    let decode = fold(&decode(asset, purpose));
+    match purpose {
+        Purpose::Texel => [decode, vec![Instruction::End {}]].concat(),
+        Purpose::Sample => {
+            let outputs = asset.shape.channel_count();
+            let before = vec![Instruction::Footprint {}, Instruction::Each {}];
+            let blend = Instruction::Blend { outputs };
+            let after = vec![Instruction::Next {}, blend, Instruction::End {}];
+            [before, decode, after].concat()
         }
     }
+}
 
-    /// Instructions from elsewhere, checked against the asset that they are to decode.
-    ///
-    /// # Errors
-    /// The first instruction that does not fit.
-    pub fn link(
-        asset: &Asset,
-        layout: Layout,
-        instructions: Vec<Instruction>,
-    ) -> Result<Program, LinkError> {
-        link::check(asset, &instructions)?;
-        Ok(Program {
-            layout,
-            instructions,
-        })
+/// One decode, without loops.
+fn decode(asset: &Asset, purpose: Purpose) -> Vec<Instruction> {
+    let mut instructions = embed(asset);
+    // Register v0 holds the inputs.
+    let mut registers = vec![0_u16];
+    for (index, layer) in asset.layers.iter().enumerate() {
+        let place = Place {
+            layer: index as u16,
+            src: registers[index],
+            dst: destination(asset, index, &registers),
+            skip: layer
+                .skip
+                .map(|skip| registers[index + 1 - usize::from(skip.span)]),
+            last: (index + 1 == asset.layers.len()).then_some(purpose),
+        };
+        match &layer.parameters {
+            Parameters::Integer(_) => integer_layer(layer, &place, &mut instructions),
+            Parameters::Half(half) => half_layer(layer, half, &place, &mut instructions),
+        }
+        registers.push(place.dst);
     }
+    instructions
+}
 
-    /// Where the unit's memory keeps the grids.
-    #[must_use]
-    pub fn layout(&self) -> Layout {
-        self.layout
-    }
-
-    /// The instructions, `end` last.
-    #[must_use]
-    pub fn instructions(&self) -> &[Instruction] {
-        &self.instructions
-    }
+/// The register that a layer writes: never the one that it reads, nor one that a later skip path
+/// starts from.
+///
+/// A layer at the end of a skip path writes over its source where it may, so that a block of layers
+/// leaves its result where it found its input, and equal blocks become equal instructions. Any other
+/// takes the first free register. A span is at most three layers, so at most three registers are
+/// held at once.
+fn destination(asset: &Asset, index: usize, registers: &[u16]) -> u16 {
+    let live = live_registers(asset, index, registers);
+    let skip = asset.layers[index].skip;
+    let source = skip.map(|skip| registers[index + 1 - usize::from(skip.span)]);
+    source
+        .into_iter()
+        .chain(0..VECTOR_COUNT)
+        .find(|register| !live.contains(register))
+        .unwrap_or(registers[index])
 }
 
 /// Where a layer stands in the program.
@@ -86,7 +78,8 @@ struct Place {
     src: u16,
     dst: u16,
     skip: Option<u16>,
-    is_last: bool,
+    /// In the last layer, what its codes are for.
+    last: Option<Purpose>,
 }
 
 fn integer_layer(layer: &Layer, place: &Place, instructions: &mut Vec<Instruction>) {
@@ -113,14 +106,15 @@ fn integer_layer(layer: &Layer, place: &Place, instructions: &mut Vec<Instructio
         Activation::Table => instructions.push(Instruction::Table { layer: id, outputs }),
     }
     let dst = place.dst;
-    instructions.push(match place.skip {
-        _ if place.is_last => Instruction::Emit { layer: id, outputs },
-        None => Instruction::Rescale {
+    instructions.push(match (place.last, place.skip) {
+        (Some(Purpose::Texel), _) => Instruction::Emit { layer: id, outputs },
+        (Some(Purpose::Sample), _) => Instruction::Collect { layer: id, outputs },
+        (None, None) => Instruction::Rescale {
             layer: id,
             dst,
             outputs,
         },
-        Some(skip) => Instruction::RescaleSkip {
+        (None, Some(skip)) => Instruction::RescaleSkip {
             layer: id,
             dst,
             skip,
@@ -160,13 +154,14 @@ fn half_layer(
     if let Some(skip) = place.skip {
         instructions.push(Instruction::SkipHalf { skip, outputs });
     }
-    instructions.push(match parameters.quantize {
-        _ if place.is_last => Instruction::EmitHalf { outputs },
-        None => Instruction::RoundHalf {
+    instructions.push(match (place.last, parameters.quantize) {
+        (Some(Purpose::Texel), _) => Instruction::EmitHalf { outputs },
+        (Some(Purpose::Sample), _) => Instruction::CollectHalf { outputs },
+        (None, None) => Instruction::RoundHalf {
             dst: place.dst,
             outputs,
         },
-        Some(_) => Instruction::QuantizeHalf {
+        (None, Some(_)) => Instruction::QuantizeHalf {
             layer: place.layer,
             dst: place.dst,
             outputs,
@@ -213,9 +208,9 @@ fn embed(asset: &Asset) -> Vec<Instruction> {
     instructions
 }
 
-/// The registers that must survive layer `index`: its skip source, and the outputs (the inputs of
-/// the layers up to this one) that a later skip path starts from.
-fn live_sources(asset: &Asset, index: usize, registers: &[u16]) -> Vec<u16> {
+/// The registers that must survive layer `index`: the one that it reads, and those that a later skip
+/// path starts from.
+fn live_registers(asset: &Asset, index: usize, registers: &[u16]) -> Vec<u16> {
     asset
         .layers
         .iter()
