@@ -89,13 +89,7 @@ impl<'a> Back<'a> {
             self.filtered = None;
             self.queued += filtered.job.pixels;
             watch.level(Signal::OutputQueue, now, self.queued);
-            show(
-                watch,
-                Stage::Filter,
-                &filtered.job,
-                filtered.start,
-                filtered.end,
-            );
+            show(watch, Stage::Filter, &filtered.job, filtered.start, now);
             self.queue.push_back(Queued {
                 job: filtered.job,
                 since: now,

@@ -135,6 +135,7 @@ impl<'a> Jobs<'a> {
         let index = self.embedded(&next.job)?;
         next.filled.filter(|&at| at <= now)?;
         let gathered = self.gathered.remove(index);
+        watch.level(Signal::HeldJobs, now, self.gathered.len() as u64);
         self.complete.pop_front();
         self.started += 1;
         watch.interval(Interval {

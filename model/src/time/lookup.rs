@@ -121,8 +121,8 @@ impl Lookup {
             return;
         };
         looked.stalled_until = None;
+        self.settle(now, watch);
         let before = self.memory.under_way();
-        self.memory.retire(now);
         let end = looked
             .group
             .fetches
@@ -169,6 +169,13 @@ impl Lookup {
         if after != before {
             watch.level(Signal::MissRegisters, now, after as u64);
         }
+    }
+
+    /// Frees the miss registers of the lines that are there at `now`, and shows when each was free.
+    pub(super) fn settle(&mut self, now: u64, watch: &mut impl Watch) {
+        self.memory.retire(now, |at, in_use| {
+            watch.level(Signal::MissRegisters, at, in_use as u64);
+        });
     }
 
     /// When the line's data are there, if it need not be asked for. A line that was replaced while

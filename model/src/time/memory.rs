@@ -105,14 +105,14 @@ impl Memory {
         self.pending.iter().map(|Reverse((at, ..))| *at).max()
     }
 
-    /// Frees the registers whose lines are there at `now`.
-    pub(super) fn retire(&mut self, now: u64) {
-        while self
-            .pending
-            .peek()
-            .is_some_and(|Reverse((at, ..))| *at <= now)
+    /// Frees the registers whose lines are there at `now`. `freed` gets the cycle from which each is
+    /// free, and how many are still in use then.
+    pub(super) fn retire(&mut self, now: u64, mut freed: impl FnMut(u64, usize)) {
+        while let Some(&Reverse((at, ..))) = self.pending.peek()
+            && at <= now
         {
             self.pending.pop();
+            freed(at, self.pending.len());
         }
     }
 
@@ -195,9 +195,9 @@ mod tests {
         assert_eq!(memory.request(8, 101), came(118, 115));
         assert_eq!(memory.request(9, 102), Err(114));
         assert_eq!(memory.pending(8).map(|arrival| arrival.at), Some(118));
-        memory.retire(113);
+        memory.retire(113, |_, _| {});
         assert_eq!(memory.request(9, 113), Err(114));
-        memory.retire(114);
+        memory.retire(114, |_, _| {});
         assert_eq!(memory.pending(7), None);
         assert_eq!(memory.request(9, 114), came(128, 128));
         assert_eq!((memory.bytes, memory.fetched), (192, 3));
@@ -225,7 +225,7 @@ mod tests {
             ))
         );
         assert_eq!(unloaded_cycles(&unit), 19);
-        memory.retire(200);
+        memory.retire(200, |_, _| {});
         assert_eq!(
             memory.request(7, 200),
             Ok((
@@ -247,7 +247,7 @@ mod tests {
                 }
             ))
         );
-        memory.retire(207);
+        memory.retire(207, |_, _| {});
         assert_eq!(
             memory.request(8, 207),
             Ok((

@@ -20,7 +20,7 @@ use super::jobs::Jobs;
 use super::ledger::{Cause, Ledger};
 use super::meter::Meter;
 use super::unit::Unit;
-use super::watch::{Stage, Watch};
+use super::watch::{Interval, Stage, Watch};
 use crate::demand::Demands;
 
 /// A group that is being embedded.
@@ -83,6 +83,13 @@ impl<'a, 'd, D: Demands, W: Watch> Stepped<'a, 'd, D, W> {
             stepped.jobs.fill_bytes = first.resident_bytes;
             stepped.jobs.fills = 1;
             stepped.charge(Cause::WeightFill, start);
+            stepped.watch.interval(Interval {
+                stage: Stage::WeightFill,
+                number: 0,
+                part: 0,
+                start: 0,
+                end: start,
+            });
         }
         Ok(stepped)
     }
@@ -96,6 +103,7 @@ impl<'a, 'd, D: Demands, W: Watch> Stepped<'a, 'd, D, W> {
             let now = self.ledger.cycles();
             while self.advance(now)? {}
             if self.is_done() {
+                self.front.lookup.settle(now, self.watch);
                 return Ok(());
             }
             let next = self.next_event(now).min(now.saturating_add(stride));

@@ -17,7 +17,7 @@ pub enum Stage {
     Corners,
     /// A group is unpacked, interpolated and embedded.
     Embed,
-    /// A job's weights come from outside.
+    /// A job's weights come from outside; the first material's before the first request, for job 0.
     WeightFill,
     /// A job waits for the array, from its last group until it starts.
     JobWait,
@@ -25,7 +25,7 @@ pub enum Stage {
     Dense,
     /// The same layer's accumulators at the requantisers, to the last activation.
     Requantize,
-    /// A job at the filter.
+    /// A job at the filter, until the output queue has room.
     Filter,
     /// A job in the output queue, from the filter until its channels start to leave.
     OutputWait,
@@ -140,18 +140,21 @@ impl Signal {
 
 /// Whoever watches a run. Everything is ignored unless it is overridden.
 pub trait Watch {
-    /// Something was in a stage. Called when it leaves, so in the order of the ends only as far as
-    /// cycles go forward.
+    /// Something was in a stage. Called when it leaves or, where that is known before, earlier:
+    /// neither starts nor ends are in order, and an interval may be empty.
     fn interval(&mut self, interval: Interval) {
         let _ = interval;
     }
 
-    /// The ledger charged the cycles `start..end` to a cause; without gaps, in order.
+    /// The ledger charged the cycles `start..end` to a cause; without gaps, in order. There may be
+    /// none, and the same cause may follow itself.
     fn charge(&mut self, cause: Cause, start: u64, end: u64) {
         let _ = (cause, start, end);
     }
 
-    /// A signal has another value from cycle `at` on.
+    /// A signal has this value from cycle `at` on; it had 0 before the first. Cycles do not go back
+    /// within a signal, and of several values in one cycle the last one holds. Across signals they may:
+    /// lines that came are seen when the tags next look.
     fn level(&mut self, signal: Signal, at: u64, value: u64) {
         let _ = (signal, at, value);
     }
