@@ -164,7 +164,8 @@ impl<'a> CriticalPath<'a> {
         };
         let cycles = self.table.of(cost, index, complete.decodes);
         let array_free = self.left_array.back().copied().unwrap_or(0);
-        let start = embedded.max(filled).max(array_free);
+        // With several bins the group that completes a job may be another's.
+        let start = embedded.max(self.looked_up).max(filled).max(array_free);
         // The array holds a job until the filter takes it.
         let left_array = (start + cycles.total).max(self.filtered);
         self.left_array.push_back(left_array);

@@ -204,14 +204,12 @@ impl Lookup {
 
     /// What happens at the start of cycle `now`. The group once its fetches are done.
     pub(super) fn advance(&mut self, now: u64, watch: &mut impl Watch) -> Option<Passed> {
-        let looked = self.looked.as_mut()?;
-        if let Some(free) = looked.stalled_until {
-            if free <= now {
-                self.issue(now, watch);
-            }
-            return None;
+        let free = self.looked.as_ref()?.stalled_until;
+        if free.is_some_and(|free| free <= now) {
+            self.issue(now, watch);
         }
-        if looked.end > now {
+        let looked = self.looked.as_mut()?;
+        if looked.stalled_until.is_some() || looked.end > now {
             return None;
         }
         if looked.fetch + 1 < looked.group.fetches.len() {
