@@ -16,6 +16,7 @@ mod program;
 mod sample;
 mod study;
 mod texel;
+mod throughput;
 mod unit;
 
 use crate::Verdict;
@@ -63,6 +64,8 @@ enum Verb {
     Profile(profile::Profile),
     /// List the units, or print one: hardware configurations with the reason for every number.
     Unit(unit::UnitVerb),
+    /// What a texel block costs: every preset on every unit, with BC7 beside them.
+    Throughput(throughput::Throughput),
     /// Run conformance vectors on a device.
     Conform(conform::Conform),
     /// Write the built-in texture set as image files.
@@ -88,6 +91,7 @@ impl Arguments {
             Verb::Convert(verb) => verb.run(json),
             Verb::Profile(verb) => verb.run(json),
             Verb::Unit(verb) => verb.run(json),
+            Verb::Throughput(verb) => verb.run(json),
             Verb::Generate(verb) => verb.run(json),
         }
     }
