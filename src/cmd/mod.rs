@@ -11,6 +11,7 @@ mod info;
 mod profile;
 mod program;
 mod sample;
+mod simulate;
 mod study;
 mod texel;
 mod unit;
@@ -44,6 +45,8 @@ enum Verb {
     Texel(texel::Texel),
     /// Sample an asset at normalised coordinates, as a shader would.
     Sample(sample::Sample),
+    /// Count a unit's cycles for a scene, a texel scan or a trace file, and say what they are spent on.
+    Simulate(simulate::Simulate),
     /// Prove what holds for every latent and texel: accumulator widths, safe rescalings, distances.
     Certify(certify::Certify),
     /// Print the microprogram of an asset.
@@ -72,6 +75,7 @@ impl Arguments {
             Verb::Info(verb) => verb.run(json),
             Verb::Texel(verb) => verb.run(json),
             Verb::Sample(verb) => verb.run(json),
+            Verb::Simulate(verb) => verb.run(json),
             Verb::Certify(verb) => verb.run(json),
             Verb::Program(verb) => verb.run(json),
             Verb::Compare(verb) => verb.run(json),
