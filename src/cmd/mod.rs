@@ -14,6 +14,7 @@ mod microprogram;
 mod profile;
 mod program;
 mod sample;
+mod simulate;
 mod study;
 mod texel;
 mod throughput;
@@ -48,6 +49,8 @@ enum Verb {
     Texel(texel::Texel),
     /// Sample an asset at normalised coordinates, as a shader would.
     Sample(sample::Sample),
+    /// Count a unit's cycles for a scene, a texel scan or a trace file, and say what they are spent on.
+    Simulate(simulate::Simulate),
     /// Prove what holds for every latent and texel: accumulator widths, safe rescalings, distances.
     Certify(certify::Certify),
     /// Print the microprogram of an asset, and what is proven of it.
@@ -82,6 +85,7 @@ impl Arguments {
             Verb::Info(verb) => verb.run(json),
             Verb::Texel(verb) => verb.run(json),
             Verb::Sample(verb) => verb.run(json),
+            Verb::Simulate(verb) => verb.run(json),
             Verb::Certify(verb) => verb.run(json),
             Verb::Program(verb) => verb.run(json),
             Verb::Asm(verb) => verb.run(json),

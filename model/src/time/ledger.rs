@@ -8,6 +8,7 @@
 //! the cause is where the oldest texel that the next job waits for is held up.
 
 use std::fmt;
+use std::ops::AddAssign;
 
 macro_rules! causes {
     ($( $(#[doc = $doc:literal])+ $variant:ident = $name:literal, )*) => {
@@ -147,6 +148,14 @@ impl Ledger {
             shares[index].1 += 1;
         }
         shares
+    }
+}
+
+impl AddAssign for Ledger {
+    fn add_assign(&mut self, other: Ledger) {
+        for (cycles, more) in self.cycles.iter_mut().zip(other.cycles) {
+            *cycles += more;
+        }
     }
 }
 

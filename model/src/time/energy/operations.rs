@@ -42,6 +42,13 @@ macro_rules! operations {
             pub const fn of(&self, operation: Operation) -> u64 {
                 match operation { $( Operation::$variant => self.$field, )+ }
             }
+
+            /// What this run did more of than another, each kind for itself; nothing where the other
+            /// did more.
+            #[must_use]
+            pub const fn beyond(&self, other: &Operations) -> Operations {
+                Operations { $( $field: self.$field.saturating_sub(other.$field), )+ }
+            }
         }
 
         impl AddAssign for Operations {
