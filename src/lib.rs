@@ -38,6 +38,7 @@ pub mod quality;
 pub mod report;
 pub mod study;
 pub mod texture_set;
+pub mod timing;
 #[cfg(feature = "gpu")]
 pub mod twin_device;
 

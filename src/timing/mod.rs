@@ -1,0 +1,3 @@
+//! Timing: what the unit in time takes for assets and streams.
+
+pub mod lab;
