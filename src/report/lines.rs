@@ -95,7 +95,8 @@ impl Lines {
     }
 }
 
-fn path(line: &[(f64, f64)]) -> String {
+/// Points as an attribute.
+pub(super) fn path(line: &[(f64, f64)]) -> String {
     line.iter()
         .map(|(x, y)| format!("{},{}", px(*x), px(*y)))
         .collect::<Vec<_>>()
@@ -103,7 +104,7 @@ fn path(line: &[(f64, f64)]) -> String {
 }
 
 /// A shape per line, so that lines differ without colour.
-fn marker(index: usize, colour: usize, x: f64, y: f64) -> Markup {
+pub(super) fn marker(index: usize, colour: usize, x: f64, y: f64) -> Markup {
     let class = format!("fill{colour}");
     let shape = |corners: &[(f64, f64)]| {
         path(

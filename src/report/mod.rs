@@ -5,15 +5,21 @@
 //! Every text that comes from data is escaped by the template engine.
 
 mod claims;
+mod curves;
+mod energy;
 mod exactness;
+mod experiments;
+mod heat;
 mod in_between;
 mod lines;
 mod maps;
+mod misses;
 mod number;
 mod overview;
 mod picture;
 mod precision;
 mod quality;
+mod roofs;
 mod stacks;
 mod svg;
 #[cfg(test)]
@@ -90,6 +96,10 @@ pub enum ReportError {
 pub fn html(study: &Study, pictures: &[MapPicture<'_>]) -> Result<String, ReportError> {
     let maps = maps::section(study, pictures)?;
     let timing = timing::section(&study.timing)?;
+    let experiments = match &study.lab {
+        None => markup! {},
+        Some(lab) => experiments::section(lab)?,
+    };
     let page = markup! {
         (DOCTYPE)
         html lang="en" {
@@ -101,6 +111,7 @@ pub fn html(study: &Study, pictures: &[MapPicture<'_>]) -> Result<String, Report
                 style { (PreEscaped(include_str!("style.css"))) }
             }
             body {
+                (stacks::hatch())
                 header { (overview::section(study)) }
                 main {
                     (maps)
@@ -108,6 +119,7 @@ pub fn html(study: &Study, pictures: &[MapPicture<'_>]) -> Result<String, Report
                     (exactness::section(&study.oracle))
                     (claims::section(&study.claims, &study.engine))
                     (timing)
+                    (experiments)
                     (precision::section(study))
                     (in_between::section(study))
                     (variants::section(study))

@@ -14,6 +14,7 @@ pub(super) fn section(study: &Study) -> Markup {
             a href="#quality" { "Quality" }
             a href="#exactness" { "Exactness" }
             a href="#timing" { "Cycles" }
+            @if study.lab.is_some() { a href="#experiments" { "Experiments" } }
             a href="#precision" { "Precision" }
         }
         (verdict(study))

@@ -155,8 +155,21 @@ fn data_uri(texels: &Array3<f32>) -> Result<String, image::ImageError> {
     } else {
         ExtendedColorType::Rgb8
     };
+    uri(&codes, columns as u32, rows as u32, colour)
+}
+
+/// Codes, row after row, as a PNG inside a data URI.
+///
+/// # Errors
+/// When PNG encoding fails.
+pub(super) fn uri(
+    codes: &[u8],
+    width: u32,
+    height: u32,
+    colour: ExtendedColorType,
+) -> Result<String, image::ImageError> {
     let mut file = Vec::new();
     PngEncoder::new_with_quality(&mut file, CompressionType::Default, FilterType::Adaptive)
-        .write_image(&codes, columns as u32, rows as u32, colour)?;
+        .write_image(codes, width, height, colour)?;
     Ok(format!("data:image/png;base64,{}", STANDARD.encode(file)))
 }

@@ -7,7 +7,7 @@ use crate::study::TimingRow;
 use maud::{Markup, html};
 
 /// Pixels from one bar to the next.
-const PITCH: f64 = 42.0;
+const PITCH: f64 = 37.0;
 
 /// A row with its cycles per texel block by cause, in the order of all causes.
 pub(super) struct Stack<'a> {
@@ -17,11 +17,11 @@ pub(super) struct Stack<'a> {
     pub(super) segments: Vec<f64>,
 }
 
-/// Every cause of every ledger, in the order of first appearance.
+/// Every cause that took cycles in any ledger, in the order of first appearance.
 pub(super) fn causes(rows: &[TimingRow]) -> Vec<&str> {
     let mut causes: Vec<&str> = Vec::new();
     for charge in rows.iter().flat_map(|row| &row.ledger) {
-        if !causes.contains(&charge.cause.as_str()) {
+        if charge.cycles > 0 && !causes.contains(&charge.cause.as_str()) {
             causes.push(&charge.cause);
         }
     }
@@ -66,14 +66,7 @@ fn is_hatched(cause: usize) -> bool {
 pub(super) fn legend(causes: &[&str]) -> Markup {
     html! {
         ul.legend {
-            @for (index, cause) in causes.iter().enumerate() {
-                li {
-                    svg.swatch viewBox="0 0 14 14" width="14" height="14" aria-hidden="true" {
-                        (segment(index, 0.0, 0.0, 14.0, 14.0, &html! {}))
-                    }
-                    (cause)
-                }
-            }
+            (swatches(causes))
             li {
                 svg.swatch viewBox="0 0 14 14" width="14" height="14" aria-hidden="true" {
                     line.bound x1="7" x2="7" y1="0" y2="14" {}
@@ -84,7 +77,29 @@ pub(super) fn legend(causes: &[&str]) -> Markup {
     }
 }
 
-fn segment(cause: usize, x: f64, y: f64, width: f64, height: f64, title: &Markup) -> Markup {
+/// Entries of a legend: what each colour means.
+pub(super) fn swatches(names: &[&str]) -> Markup {
+    html! {
+        @for (index, name) in names.iter().enumerate() {
+            li {
+                svg.swatch viewBox="0 0 14 14" width="14" height="14" aria-hidden="true" {
+                    (segment(index, 0.0, 0.0, 14.0, 14.0, &html! {}))
+                }
+                (name)
+            }
+        }
+    }
+}
+
+/// A rectangle in the colour of a category, with what it says when pointed at.
+pub(super) fn segment(
+    cause: usize,
+    x: f64,
+    y: f64,
+    width: f64,
+    height: f64,
+    title: &Markup,
+) -> Markup {
     let (x, y, width, height) = (px(x), px(y), px(width), px(height));
     html! {
         g {
@@ -92,6 +107,19 @@ fn segment(cause: usize, x: f64, y: f64, width: f64, height: f64, title: &Markup
             rect class=(fill(cause)) x=(x) y=(y) width=(width) height=(height) {}
             @if is_hatched(cause) {
                 rect fill="url(#hatch)" x=(x) y=(y) width=(width) height=(height) {}
+            }
+        }
+    }
+}
+
+/// What hatches refer to; once on a page, before the first of them.
+pub(super) fn hatch() -> Markup {
+    html! {
+        svg.unseen width="0" height="0" aria-hidden="true" {
+            defs {
+                pattern #hatch width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)" {
+                    line.hatch x1="0" x2="0" y1="0" y2="6" {}
+                }
             }
         }
     }
@@ -122,11 +150,6 @@ pub(super) fn chart(stacks: &[Stack<'_>]) -> Markup {
     let view = format!("0 0 960 {}", px(bottom + 44.0));
     html! {
         svg.wide viewBox=(view) role="img" aria-label="Cycles per texel block by cause, for each unit and layout" {
-            defs {
-                pattern #hatch width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)" {
-                    line.hatch x1="0" x2="0" y1="0" y2="6" {}
-                }
-            }
             @for (axis, unit, name) in [
                 (cycles, "", "cycles per 4×4 texel block"),
                 (shares, " %", "share of each unit’s own cycles"),

@@ -18,13 +18,16 @@ pub use in_between::{InBetween, in_between, in_between_points};
 pub use ntmu_conformance::claims::Findings;
 pub use oracle::{OracleStudy, compare_with_oracle};
 pub use sweep::{SweepPoint, SweepStudyError, sweep, sweep_points};
-pub use timing::{Charge, TimingRow, simulate, timing_points};
+pub use timing::{
+    Charge, LevelBytes, TimingRow, experiment, experiment_points, simulate, timing_points,
+};
 pub use twin::{TwinStudy, compare_with_twin};
 pub use variants::{Variant, VariantOutcome, Variants, variant_count, variants};
 pub use vectors::vectors;
 
 use crate::precision;
 use crate::quality::{self, Quality};
+use crate::timing::lab::Lab;
 use ntmu_isa::Asset;
 use serde::Serialize;
 
@@ -94,8 +97,10 @@ pub struct Study {
     pub claims: Findings,
     /// Against the GPU twin.
     pub twin: TwinStudy,
-    /// Per unit and layout.
+    /// Per access, unit and layout.
     pub timing: Vec<TimingRow>,
+    /// The experiments on the unit in time; none where none was made.
+    pub lab: Option<Lab>,
     /// Per latent width and weight width; empty without a source.
     pub sweep: Vec<SweepPoint>,
     /// Between mips, per level of detail and way to decode; empty without a source.

@@ -122,8 +122,9 @@ pub fn assemble(text: &str) -> Result<(Layout, Vec<Instruction>), AssemblyError>
         let (mnemonic, rest) = code.split_once(char::is_whitespace).unwrap_or((code, ""));
         if mnemonic == ".layout" {
             let name = rest.trim();
-            layout =
-                name.parse().map_err(|error: LayoutError| line.error(name, error.allowed()))?;
+            layout = name
+                .parse()
+                .map_err(|error: LayoutError| line.error(name, error.allowed()))?;
             continue;
         }
         let row = TABLE

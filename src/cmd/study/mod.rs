@@ -14,6 +14,7 @@ use ntmu::quality::{self, Quality};
 use ntmu::report::{self, MapPicture};
 use ntmu::study::{self, AssetStudy, Study as Results};
 use ntmu::texture_set::TextureSet;
+use ntmu::timing::lab::Sizes;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -27,6 +28,10 @@ pub(crate) struct Study {
     /// The folder for report.html, study.json and vectors.json.
     #[arg(short, long, value_name = "DIR", default_value = "study")]
     output: PathBuf,
+    /// Time the unit on small scenes: sooner done, and more about the start of a run than about its
+    /// middle.
+    #[arg(long)]
+    quick: bool,
     #[command(flatten)]
     profile: ProfileChoice,
 }
@@ -36,7 +41,12 @@ impl Study {
         let (asset, reference) = self.read()?;
         // A folder that cannot be made is found out before the work, not after it.
         files::make_folder(&self.output)?;
-        let (results, decoded) = study(&asset, reference.as_deref())?;
+        let sizes = if self.quick {
+            Sizes::QUICK
+        } else {
+            Sizes::STUDY
+        };
+        let (results, decoded) = study(&asset, reference.as_deref(), &sizes)?;
 
         let reals = decoded.reals(&asset.shape);
         let pictures = pictures(&asset, reference.as_deref(), &reals);
@@ -84,7 +94,11 @@ impl Study {
 }
 
 /// Runs every part of the study, with progress on stderr.
-fn study(asset: &Asset, reference: Option<&[Array3<f32>]>) -> anyhow::Result<(Results, Decoded)> {
+fn study(
+    asset: &Asset,
+    reference: Option<&[Array3<f32>]>,
+    sizes: &Sizes,
+) -> anyhow::Result<(Results, Decoded)> {
     let texels = asset.shape.texel_count();
     let bar = console::progress(texels, "model");
     let decoded = Decoded::of(asset, |done| bar.set_position(done));
@@ -114,8 +128,11 @@ fn study(asset: &Asset, reference: Option<&[Array3<f32>]>) -> anyhow::Result<(Re
     let twin = study::compare_with_twin(asset, &decoded, |done| bar.set_position(done));
     bar.finish_and_clear();
 
-    let bar = console::progress(study::timing_points(), "units");
-    let timing = study::simulate(asset, |done| bar.set_position(done));
+    let bar = console::progress(study::timing_points(asset), "units");
+    let timing = study::simulate(asset, sizes, |done| bar.set_position(done))?;
+    bar.finish_and_clear();
+    let bar = console::progress(study::experiment_points(asset), "lab");
+    let lab = study::experiment(asset, sizes, |done| bar.set_position(done))?;
     bar.finish_and_clear();
 
     let bar = console::progress(study::sweep_points(asset), "sweep");
@@ -144,6 +161,7 @@ fn study(asset: &Asset, reference: Option<&[Array3<f32>]>) -> anyhow::Result<(Re
             claims,
             twin,
             timing,
+            lab: Some(lab),
             sweep,
             in_between,
             variants,

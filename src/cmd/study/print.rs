@@ -181,6 +181,7 @@ fn print_claims(found: &Findings) {
 
 fn print_timing(results: &Results) {
     let mut table = console::table(&[
+        "access",
         "unit",
         "layout",
         "cycles/block",
@@ -193,6 +194,7 @@ fn print_timing(results: &Results) {
     ]);
     for row in &results.timing {
         table.add_row([
+            row.access.clone(),
             row.unit.clone(),
             row.layout.clone(),
             format!("{:.1}", row.cycles_per_block),
@@ -219,7 +221,8 @@ fn print_timing(results: &Results) {
             })
             .collect();
         console::print(&format!(
-            "{} {}: {}",
+            "{}, {} {}: {}",
+            row.access,
             row.unit,
             row.layout,
             charges.join(", ")

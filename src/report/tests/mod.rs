@@ -6,8 +6,8 @@ mod parts;
 use super::MapPicture;
 use crate::quality::{Figures, MapQuality, Quality};
 use crate::study::{
-    AssetStudy, Charge, EngineStudy, Findings, InBetween, OracleStudy, Study, SweepPoint,
-    TimingRow, TwinStudy, Variant, VariantOutcome, Variants,
+    AssetStudy, Charge, EngineStudy, Findings, InBetween, LevelBytes, OracleStudy, Study,
+    SweepPoint, TimingRow, TwinStudy, Variant, VariantOutcome, Variants,
 };
 use ndarray::Array3;
 use ntmu_conformance::claims::{Channel, Distance};
@@ -24,11 +24,28 @@ fn row(unit: &str, layout: &str, ledger: Vec<Charge>) -> TimingRow {
     let cycles = ledger.iter().map(|charge| charge.cycles).sum();
     TimingRow {
         unit: unit.to_owned(),
+        identity: format!("{unit}@0123456789ab"),
         layout: layout.to_owned(),
+        access: "blocks".to_owned(),
+        scene: "blocks:mip=0".to_owned(),
+        pixels: 160,
         texels: 160,
         cycles,
         cycles_per_block: cycles as f64 / 10.0,
+        block_cycles_p50: 44.4,
+        block_cycles_p99: 55.5,
         closed_form_per_block: 31.41,
+        critical_path_per_block: 30.33,
+        without_cache_per_block: 99.44,
+        infinite_cache_per_block: 35.55,
+        bytes_per_block_without_cache: 888.81,
+        bytes_per_block_infinite_cache: 21.71,
+        levels: LevelBytes {
+            latent_cache: 765.4,
+            second_level: 0.0,
+            memory: 26.26,
+            weights: 0.92,
+        },
         bytes_per_block: 27.18,
         hit_rate: 0.9371,
         mac_utilisation: 0.6113,
@@ -119,6 +136,7 @@ fn study() -> Study {
                 vec![charge("weight-fill", 3), charge("compute", 401)],
             ),
         ],
+        lab: None,
         sweep: [
             (4, 8, 34.25, 0.577),
             (4, 6, 33.5, 0.561),

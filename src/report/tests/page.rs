@@ -3,6 +3,8 @@
 use super::{charge, picture, ramp, row, study};
 use crate::report::{MapPicture, ReportError, html};
 use crate::study::TwinStudy;
+use crate::timing::lab::{Lab, Sizes};
+use std::sync::LazyLock;
 
 #[test]
 fn hostile_names_are_escaped_wherever_they_come_from() {
@@ -99,7 +101,7 @@ fn every_number_of_the_tables_is_in_the_page() {
                    0.8543|8×4|4×2";
     let exactness = "786,429|777,017|4,210|5,202|0.5353 %|98.8032 %|0.6615 %|1.83|0.296|0.291|\
                      41.7|>−1<|>+1<";
-    let cycles = "45.70|40.40|31.41|1.45 ×|1.29 ×|27.18|93.7 %|61.1 %|1,234.6|MAC array|40.00|\
+    let cycles = "45.70|40.40|31.41|1.45 ×|1.29 ×|27.18|93.7 %|61.1 %|1,234.6|MAC array|44.4|55.5|30.33|99.44|35.55|888.81|21.71|765.4|26.26|0.92|40.00|\
                   5.70|0.30|40.10|87.5 %|12.5 %|99.3 %|0.7 %";
     let precision = "34.25|33.50|29.75|0.561|0.455|6,021|31.09|layer 2: found a table|30.50|0.490";
     let numbers = [facts, quality, exactness, cycles, precision];
@@ -198,4 +200,37 @@ fn odd_figures_do_not_stop_the_report() {
             .unwrap()
             .contains("No point has a finite PSNR")
     );
+}
+/// Every experiment on the built-in asset, on small scenes.
+static LAB: LazyLock<Lab> = LazyLock::new(|| {
+    let asset = crate::built_in::asset().unwrap();
+    Lab::run(&asset, &Sizes::QUICK, |_| ()).unwrap()
+});
+
+#[test]
+fn every_experiment_has_its_figure_and_no_figure_has_a_number_that_is_none() {
+    let mut study = study();
+    let without = html(&study, &[]).unwrap();
+    assert!(!without.contains("id=\"experiments\""));
+    study.lab = Some(LAB.clone());
+    let page = html(&study, &[]).unwrap();
+    assert!(page.contains("id=\"experiments\""));
+    for figure in [
+        "Relative performance of BC7, 3 maps over the depth of the corner FIFO",
+        "Bytes from memory per pixel for each layout and cache line",
+        "Bytes from memory per pixel over the size of the cache",
+        "Cycles per block over the number of materials",
+        "Roofline",
+        "Energy per texel block by part",
+        "Lines missed over the screen",
+    ] {
+        assert!(page.contains(figure), "{figure}");
+    }
+    assert_eq!(page.matches("data:image/png;base64,").count(), 3);
+    assert!(!page.contains("NaN") && !page.contains(",inf") && !page.contains("\"inf"));
+    // An element with two class attributes would lose the second.
+    for tag in page.split('<') {
+        let tag = tag.split('>').next().unwrap_or_default();
+        assert!(tag.matches(" class=").count() <= 1, "{tag}");
+    }
 }
