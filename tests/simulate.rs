@@ -358,3 +358,25 @@ fn what_cannot_be_run_is_refused_with_what_is_allowed_and_nothing_is_written() {
     ];
     assert_eq!(ntmu(&again, folder.path()).status.code(), Some(2));
 }
+
+#[test]
+fn a_run_leaves_the_files_that_were_asked_for_and_reads_as_it_would_without() {
+    let folder = folder();
+    let scan = ["--access", "blocks:mip=2", "--no-brackets", "--json"];
+    let plain = ntmu(&[&["simulate"], &scan[..]].concat(), folder.path());
+    let files = ["vcd", "perfetto", "konata", "ramulator", "heatmap"];
+    let options = files.map(|file| format!("--{file}"));
+    let mut arguments = [&["simulate"], &scan[..]].concat();
+    for (option, file) in options.iter().zip(files) {
+        arguments.extend([option.as_str(), file]);
+    }
+    let watched = ntmu(&arguments, folder.path());
+    assert_eq!(watched.stdout, plain.stdout, "{}", stderr(&watched));
+    let begins: [&[u8]; 5] = [b"$", b"{", b"Kanata\t0004\n", b"LD 0x", b"\x89PNG"];
+    for (file, begin) in files.into_iter().zip(begins) {
+        let bytes = std::fs::read(folder.path().join(file)).unwrap();
+        assert!(bytes.starts_with(begin), "{file}");
+    }
+    let refused = ntmu(&["simulate", "--cycles", "9..3"], folder.path());
+    assert_eq!(refused.status.code(), Some(2));
+}

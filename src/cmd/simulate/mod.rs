@@ -2,7 +2,6 @@
 
 mod outputs;
 mod print;
-mod ramulator;
 
 use super::profile::ProfileChoice;
 use super::unit;
@@ -287,7 +286,7 @@ impl Simulate {
         let runs = if self.no_brackets { 1 } else { 3 };
         let bar = console::progress(source.most_pixels() * runs, "pixels");
         let tell = |pixels| bar.inc(pixels);
-        let mut outputs = self.outputs.open()?;
+        let mut outputs = self.outputs.open(unit)?;
         let watch = self.outputs.given().map(|_| &mut outputs.watches);
         let after = self.measure_after.unwrap_or(0);
         let brackets = !self.no_brackets;
@@ -301,7 +300,12 @@ impl Simulate {
                  so that a job is left to measure"
             );
         }
-        outputs.keep()?;
+        for (path, shown) in outputs.keep()? {
+            let (path, from, to, cycles) = (path.display(), shown.from, shown.to, shown.cycles);
+            console::note(&format!(
+                "{path} shows cycles {from}..{to} of {cycles}; --cycles chooses others"
+            ));
+        }
         let behind = (after > 0).then(|| {
             let counts = Counts::default().behind_warm_up(timing);
             let summary = Summary::of_parts(&counts, unit);

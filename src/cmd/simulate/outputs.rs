@@ -1,8 +1,12 @@
-//! The files that a run can leave. Another option is a field of [`Outputs`], a line in each of its
-//! functions, and a member of [`Watches`].
+//! The files that a run can leave. Another option is a field of [`Outputs`] and of [`Files`], a line
+//! in each of their functions, and a member of [`Watches`].
 
-use super::ramulator::Ramulator;
 use anyhow::Context as _;
+use ntmu::model::time::Unit;
+use ntmu::timing::heat::{HeatValue, MissMap};
+use ntmu::timing::waves::{
+    Konata, Perfetto, Ramulator, RamulatorFormat, Summary, Vcd, VcdTime, Window,
+};
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
@@ -10,19 +14,56 @@ use tempfile::NamedTempFile;
 
 #[derive(clap::Args)]
 pub(super) struct Outputs {
+    /// Write the unit's signals as a value change dump, for GTKWave or Surfer.
+    #[arg(long, value_name = "FILE")]
+    vcd: Option<PathBuf>,
+    /// Write a timeline as trace events, for ui.perfetto.dev.
+    #[arg(long, value_name = "FILE")]
+    perfetto: Option<PathBuf>,
+    /// Write groups, jobs and layers as a pipeline, for Konata.
+    #[arg(long, value_name = "FILE")]
+    konata: Option<PathBuf>,
     /// Write the lines asked of memory as a load-store trace for Ramulator 2.
     #[arg(long, value_name = "FILE")]
     ramulator: Option<PathBuf>,
+    /// Write where on the screen lines were missed, as a PNG.
+    #[arg(long, value_name = "FILE")]
+    heatmap: Option<PathBuf>,
+    /// The cycles that the signals, the timeline and the pipeline show [default: 0..1000000]
+    #[arg(long, value_name = "FROM..TO", value_parser = cycles)]
+    cycles: Option<Window>,
 }
 
-/// Whoever writes the files of a run. Another option makes a pair of this and its own, and so on:
-/// `(Option<A>, (Option<B>, Option<C>))` is a watch too.
-pub(super) type Watches = Option<Ramulator<BufWriter<File>>>;
+/// `1000..2000`.
+fn cycles(text: &str) -> Result<Window, String> {
+    let parts = text
+        .split_once("..")
+        .map(|(from, to)| (from.parse(), to.parse()));
+    match parts {
+        Some((Ok(from), Ok(to))) if from < to => Ok(Window { from, to }),
+        Some(_) | None => Err(format!("found `{text}`; allowed: FROM..TO, 0..1000000")),
+    }
+}
+
+type Writer = BufWriter<File>;
+
+/// Whoever watches the run for its files.
+pub(super) type Watches = (
+    (Option<Vcd<Writer>>, Option<Perfetto<Writer>>),
+    (
+        (Option<Konata<Writer>>, Option<Ramulator<Writer>>),
+        Option<MissMap>,
+    ),
+);
 
 /// The files of a run while it runs, beside their places.
 pub(super) struct Files {
     pub(super) watches: Watches,
+    vcd: Option<Beside>,
+    perfetto: Option<Beside>,
+    konata: Option<Beside>,
     ramulator: Option<Beside>,
+    heatmap: Option<(Writer, Beside)>,
 }
 
 /// A file beside its place.
@@ -34,32 +75,87 @@ struct Beside {
 impl Outputs {
     /// The first option that was given: it needs the whole run.
     pub(super) fn given(&self) -> Option<&'static str> {
-        let options = [("--ramulator", self.ramulator.is_some())];
-        let mut given = options.iter().filter(|(_, is_given)| *is_given);
+        let options = [
+            ("--vcd", &self.vcd),
+            ("--perfetto", &self.perfetto),
+            ("--konata", &self.konata),
+            ("--ramulator", &self.ramulator),
+            ("--heatmap", &self.heatmap),
+        ];
+        let mut given = options.iter().filter(|(_, path)| path.is_some());
         given.next().map(|(option, _)| *option)
     }
 
-    /// Opens the files beside their places.
-    pub(super) fn open(&self) -> anyhow::Result<Files> {
+    /// Opens the files of a run of `unit` beside their places.
+    pub(super) fn open(&self, unit: &Unit) -> anyhow::Result<Files> {
+        let window = self.cycles.unwrap_or_default();
+        let (vcd, vcd_file) = begin(self.vcd.as_deref())?.unzip();
+        let (perfetto, perfetto_file) = begin(self.perfetto.as_deref())?.unzip();
+        let (konata, konata_file) = begin(self.konata.as_deref())?.unzip();
         let (ramulator, ramulator_file) = begin(self.ramulator.as_deref())?.unzip();
+        let loads = |writer| {
+            let format = RamulatorFormat::LoadStore;
+            Ramulator::new(writer, unit, Window::ALL, format, unit.line_bytes)
+        };
+        let map = self.heatmap.as_ref().map(|_| MissMap::new(CELL_PIXELS));
         Ok(Files {
-            watches: ramulator.map(Ramulator::new),
+            watches: (
+                (
+                    vcd.map(|writer| Vcd::new(writer, unit, window, VcdTime::Cycles)),
+                    perfetto.map(|writer| Perfetto::new(writer, unit, window)),
+                ),
+                (
+                    (
+                        konata.map(|writer| Konata::new(writer, unit, window)),
+                        ramulator.map(loads),
+                    ),
+                    map,
+                ),
+            ),
+            vcd: vcd_file,
+            perfetto: perfetto_file,
+            konata: konata_file,
             ramulator: ramulator_file,
+            heatmap: begin(self.heatmap.as_deref())?,
         })
     }
 }
 
+/// Pixels along the side of a heat map's cell: a quad.
+const CELL_PIXELS: u32 = 2;
+
 impl Files {
-    /// Puts the files in their places.
-    pub(super) fn keep(self) -> anyhow::Result<()> {
-        let ramulator = self.watches;
-        end(self.ramulator, ramulator.map(Ramulator::finish))
+    /// Puts the files in their places. What lay outside the cycles that a file shows, by its path.
+    pub(super) fn keep(self) -> anyhow::Result<Vec<(PathBuf, Summary)>> {
+        let ((vcd, perfetto), ((konata, ramulator), map)) = self.watches;
+        let mut cut = Vec::new();
+        for (beside, finished) in [
+            (self.vcd, vcd.map(Vcd::finish)),
+            (self.perfetto, perfetto.map(Perfetto::finish)),
+            (self.konata, konata.map(Konata::finish)),
+            (self.ramulator, ramulator.map(Ramulator::finish)),
+        ] {
+            if let (Some(beside), Some(finished)) = (beside, finished) {
+                let path = beside.path.clone();
+                let summary = finished.with_context(|| cannot(&path))?;
+                end(beside)?;
+                if summary.left_out > 0 {
+                    cut.push((path, summary));
+                }
+            }
+        }
+        if let (Some((writer, beside)), Some(map)) = (self.heatmap, map) {
+            let written = map.write_png(writer, HeatValue::Misses);
+            written.with_context(|| cannot(&beside.path))?;
+            end(beside)?;
+        }
+        Ok(cut)
     }
 }
 
 /// Opens a file beside its place, for whoever writes it.
-fn begin(path: Option<&Path>) -> anyhow::Result<Option<(BufWriter<File>, Beside)>> {
-    let open = |path: &Path| -> io::Result<(BufWriter<File>, Beside)> {
+fn begin(path: Option<&Path>) -> anyhow::Result<Option<(Writer, Beside)>> {
+    let open = |path: &Path| -> io::Result<(Writer, Beside)> {
         let file = ntmu::beside::file_for(path)?;
         let writer = BufWriter::new(file.as_file().try_clone()?);
         let path = path.to_owned();
@@ -69,12 +165,9 @@ fn begin(path: Option<&Path>) -> anyhow::Result<Option<(BufWriter<File>, Beside)
     path.map(open).transpose()
 }
 
-/// Puts a file in its place when what watched has written all of it.
-fn end<T>(beside: Option<Beside>, finished: Option<io::Result<T>>) -> anyhow::Result<()> {
-    let (Some(Beside { file, path }), Some(finished)) = (beside, finished) else {
-        return Ok(());
-    };
-    finished.with_context(|| cannot(&path))?;
+/// Puts a file that is written in its place.
+fn end(beside: Beside) -> anyhow::Result<()> {
+    let Beside { file, path } = beside;
     file.as_file().sync_all().with_context(|| cannot(&path))?;
     file.persist(&path).with_context(|| cannot(&path))?;
     Ok(())
