@@ -27,7 +27,7 @@ fn a_program_returns_from_assembly_to_an_image_and_back() {
     let folder = folder();
     let asset = asset_in(folder.path());
     let asset = asset.to_str().unwrap();
-    for kind in [&["--layout", "tiled"][..], &["--sample"][..]] {
+    for kind in [&["--layout", "tiles-4"][..], &["--sample"][..]] {
         let program = [&["program", asset, "-o", "wall.s", "--json"], kind].concat();
         let described = json(&ntmu(&program, folder.path()));
         let asm = [

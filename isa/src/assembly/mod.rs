@@ -1,7 +1,7 @@
 //! Assembly: a program as text, both ways.
 //!
 //! ```text
-//! .layout tiled
+//! .layout tiles-4
 //! position      g0
 //! concat        v0, 0, g0     ; mnemonic, then operands in the order of the table
 //! repeat        4, 2          ; a loop: what it repeats is indented when printed

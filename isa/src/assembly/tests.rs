@@ -98,7 +98,7 @@ fn word() -> impl Strategy<Value = String> {
     prop_oneof![
         proptest::sample::select(known),
         "[gvl]?[0-9]{0,6}",
-        proptest::sample::select(vec![",", ";", "\n", " ", ".layout", "tiled", "g99999"])
+        proptest::sample::select(vec![",", ";", "\n", " ", ".layout", "tiles-4", "g99999"])
             .prop_map(str::to_owned),
         "\\PC{0,3}",
     ]
