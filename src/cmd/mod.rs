@@ -50,7 +50,7 @@ enum Verb {
     /// Sample an asset at normalised coordinates, as a shader would.
     Sample(sample::Sample),
     /// Count a unit's cycles for a scene, a texel scan or a trace file, and say what they are spent on.
-    Simulate(simulate::Simulate),
+    Simulate(Box<simulate::Simulate>),
     /// Prove what holds for every latent and texel: accumulator widths, safe rescalings, distances.
     Certify(certify::Certify),
     /// Print the microprogram of an asset, and what is proven of it.
