@@ -1,7 +1,7 @@
 //! Closed form: a lower bound of a run's cycles from sums and maxima, without stepping.
 //!
 //! For each resource: its work in cycles, and when the first thing can reach it. Beside them the
-//! longest path through the groups and jobs ([`critical`](super::critical)). The bound is the largest
+//! longest path through the groups and jobs (`critical`). The bound is the largest
 //! of all; a run with ideal memory and endless queues takes exactly as long.
 
 use super::assemble::{Group, Job};
