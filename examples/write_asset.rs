@@ -9,6 +9,7 @@ use ntmu::isa::latent::LatentFormat;
 use ntmu::isa::layer::{IntegerParameters, Layer, Parameters};
 use ntmu::isa::layout::Layout;
 use ntmu::isa::position::{AddressMode, CornerSnap};
+use ntmu::isa::pyramid::Pyramid;
 use ntmu::isa::profile::Profile;
 use ntmu::isa::rescale::Multiplier;
 use ntmu::isa::shape::{GridShape, OutputFormat, Sampling, Shape};
@@ -50,6 +51,7 @@ pub(crate) fn asset() -> Result<Asset, Box<dyn Error>> {
         input_bits: 8,
         snap: CornerSnap::Cell,
         address_mode: AddressMode::Clamp,
+        pyramid: Pyramid::SINGLE,
         grids: [grid(Sampling::Corners), grid(Sampling::Interpolated)],
         outputs: vec![OutputFormat::Unorm8],
     };

@@ -11,6 +11,7 @@ use ntmu_isa::embed::Wave;
 use ntmu_isa::half::Half;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{OutputFormat, Shape};
@@ -64,6 +65,7 @@ fn by_hand() -> Asset {
             input_bits: 8,
             snap: CornerSnap::Cell,
             address_mode: AddressMode::Wrap,
+            pyramid: Pyramid::SINGLE,
             grids: [corners(1, 4, 3), interpolated(1, 4, 3)],
             outputs: vec![OutputFormat::Unorm8],
         },

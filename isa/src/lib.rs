@@ -49,6 +49,7 @@ pub mod position;
 pub mod preset;
 pub mod profile;
 pub mod program;
+pub mod pyramid;
 pub mod rescale;
 pub mod round;
 pub mod sampler;

@@ -7,6 +7,7 @@
 use crate::embed::Wave;
 use crate::latent::LatentFormat;
 use crate::position::{AddressMode, CornerSnap};
+use crate::pyramid::Pyramid;
 use crate::shape::{GridShape, OutputFormat, Sampling, Shape};
 
 /// The activation of a synthesizer's hidden layers, without the scales that an
@@ -35,6 +36,8 @@ pub struct Preset {
     pub name: &'static str,
     /// One line on what it stands for.
     pub about: &'static str,
+    /// Which level of the grids serves a mip.
+    pub pyramid: Pyramid,
     /// Grid 0 and grid 1.
     pub grids: [GridShape; 2],
     /// Widths of the plain hidden layers, each with the activation; at least one.
@@ -81,6 +84,7 @@ const fn preset(
     Preset {
         name,
         about,
+        pyramid: Pyramid::SINGLE,
         grids: [
             grid(grids[0], Sampling::Corners),
             grid(grids[1], Sampling::Interpolated),
@@ -270,6 +274,7 @@ impl Preset {
             input_bits: Preset::INPUT_BITS,
             snap: Preset::SNAP,
             address_mode: Preset::ADDRESS_MODE,
+            pyramid: self.pyramid,
             grids: self.grids,
             outputs,
         }

@@ -3,6 +3,7 @@
 use crate::embed::{WAVES_PER_OCTAVE, Wave};
 use crate::latent::LatentFormat;
 use crate::position::{AddressMode, CornerSnap};
+use crate::pyramid::Pyramid;
 
 /// How a channel leaves the unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -160,6 +161,8 @@ pub struct Shape {
     pub snap: CornerSnap,
     /// See [`AddressMode`]; for both axes and grids.
     pub address_mode: AddressMode,
+    /// Which level of the grids serves a mip; see [`Pyramid`].
+    pub pyramid: Pyramid,
     /// Grid 0 and grid 1; in CNTC the corners of grid 0 are concatenated and grid 1 is interpolated.
     pub grids: [GridShape; 2],
     /// One output format for each channel.
@@ -180,20 +183,50 @@ impl Shape {
         (if w == 0 { 1 } else { w }, if h == 0 { 1 } else { h })
     }
 
-    /// Cells of a grid along x and y.
+    /// Cells of level 0 of a grid along x and y.
     #[must_use]
     pub const fn grid_size(&self, grid: usize) -> (u32, u32) {
+        self.level_size(grid, 0)
+    }
+
+    /// Levels of each grid: as many as the mips need.
+    #[must_use]
+    pub const fn level_count(&self) -> u8 {
+        self.pyramid.level_of(self.mip_count.saturating_sub(1)) + 1
+    }
+
+    /// Cells of a level of a grid along x and y: the texels of mip 0 over the reduction of grid and
+    /// level, rounded up.
+    #[must_use]
+    pub const fn level_size(&self, grid: usize, level: u8) -> (u32, u32) {
+        let log2 = self.grids[grid]
+            .scale_log2
+            .saturating_add(self.pyramid.reduction_log2(level));
+        // A side is below 2^32.
+        let log2 = if log2 > 31 { 31 } else { log2 };
         (
-            self.grids[grid].cells(self.width),
-            self.grids[grid].cells(self.height),
+            self.width.div_ceil(1 << log2),
+            self.height.div_ceil(1 << log2),
         )
     }
 
-    /// Latents of a grid.
+    /// Latents of a level of a grid.
     #[must_use]
-    pub const fn grid_latents(&self, grid: usize) -> u64 {
-        let (w, h) = self.grid_size(grid);
+    pub const fn level_latents(&self, grid: usize, level: u8) -> u64 {
+        let (w, h) = self.level_size(grid, level);
         w as u64 * h as u64 * self.grids[grid].channels as u64
+    }
+
+    /// Latents of a grid before those of a level: levels follow each other, level 0 first.
+    #[must_use]
+    pub fn level_base(&self, grid: usize, level: u8) -> u64 {
+        (0..level).map(|level| self.level_latents(grid, level)).sum()
+    }
+
+    /// Latents of all levels of a grid.
+    #[must_use]
+    pub fn grid_latents(&self, grid: usize) -> u64 {
+        self.level_base(grid, self.level_count())
     }
 
     /// Inputs of the synthesizer: those of both grids, the waves, the level, the padding.

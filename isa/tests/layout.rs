@@ -6,6 +6,7 @@ use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layout::{BASE_ALIGNMENT, Inside, Layout, LayoutError, Order, Side, Storage};
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -22,6 +23,7 @@ fn shape(width: u32, height: u32, grids: [(u16, u8, u8); 2]) -> Shape {
         input_bits: 8,
         snap: CornerSnap::Cell,
         address_mode: AddressMode::Wrap,
+        pyramid: Pyramid::SINGLE,
         grids: grids.map(|(channels, bits, scale_log2)| GridShape {
             channels,
             format: LatentFormat::new(bits).unwrap(),

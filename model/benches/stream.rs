@@ -5,6 +5,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
 use ntmu_isa::sampler::{Order, Sampler};
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
@@ -30,6 +31,7 @@ fn shape(size: u32) -> Shape {
         input_bits: 8,
         snap: CornerSnap::Cell,
         address_mode: AddressMode::Wrap,
+        pyramid: Pyramid::SINGLE,
         grids: [grid; 2],
         outputs: vec![OutputFormat::Unorm8; 9],
     }

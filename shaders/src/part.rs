@@ -132,6 +132,7 @@ mod tests {
     use ntmu_isa::latent::LatentFormat;
     use ntmu_isa::layer::{HalfParameters, Parameters};
     use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
     use ntmu_isa::profile::Profile;
     use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 
@@ -147,6 +148,7 @@ mod tests {
             input_bits: 8,
             snap: CornerSnap::Cell,
             address_mode: AddressMode::Wrap,
+            pyramid: Pyramid::SINGLE,
             grids: [GridShape {
                 channels: 1,
                 format: LatentFormat::new(1).unwrap(),

@@ -11,6 +11,7 @@ use ntmu::access::{AccessError, TraceFile};
 use ntmu::isa::embed::Wave;
 use ntmu::isa::latent::LatentFormat;
 use ntmu::isa::position::{AddressMode, CornerSnap};
+use ntmu::isa::pyramid::Pyramid;
 use ntmu::isa::profile::Profile;
 use ntmu::isa::sampler::Sampler;
 use ntmu::isa::shape::{GridShape, OutputFormat, Sampling, Shape};
@@ -36,6 +37,7 @@ pub(crate) fn shape(width: u32, height: u32) -> Shape {
         input_bits: 8,
         snap: CornerSnap::Cell,
         address_mode: AddressMode::Wrap,
+        pyramid: Pyramid::SINGLE,
         grids: [grid; 2],
         outputs: vec![OutputFormat::Unorm8; 3],
     }

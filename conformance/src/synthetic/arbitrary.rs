@@ -7,6 +7,7 @@ use ntmu_isa::embed::Wave;
 use ntmu_isa::filter::FilterRule;
 use ntmu_isa::half::SumOrder;
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::{PointSnap, Profile};
 use ntmu_isa::rescale::Requantizer;
 use ntmu_isa::round::Rounding;
@@ -87,6 +88,7 @@ fn shape(r: &mut Random) -> Shape {
         input_bits: usual_or(r, 8, 4, 16),
         snap: r.choose(&CornerSnap::ALL),
         address_mode: r.choose(&AddressMode::ALL),
+        pyramid: Pyramid::SINGLE,
         grids,
         outputs: (0..channels)
             .map(|_| r.choose(&OutputFormat::ALL))

@@ -3,6 +3,7 @@
 use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 
@@ -96,6 +97,7 @@ impl Spec {
                 input_bits: 8,
                 snap: CornerSnap::Cell,
                 address_mode: AddressMode::Wrap,
+                pyramid: Pyramid::SINGLE,
                 grids: [corners(2, 4, 3), interpolated(3, 4, 3)],
                 outputs: vec![OutputFormat::Unorm8; 2],
             },

@@ -11,6 +11,7 @@ use crate::latent::LatentFormat;
 use crate::limits;
 use crate::position::{AddressMode, CornerSnap};
 use crate::profile::{PointSnap, Profile};
+use crate::pyramid::Pyramid;
 use crate::rescale::Requantizer;
 use crate::round::Rounding;
 use crate::shape::{GridShape, OutputFormat, Sampling, Shape};
@@ -35,7 +36,7 @@ pub(super) fn zeros(cursor: &mut Cursor<'_>, field: &str, count: usize) -> Resul
 
 /// ```text
 /// u32 width, u32 height, u8 mips, u8 octaves, u8 wave, u8 padding,
-/// u8 bits of an input, u8 snap, u8 address mode, u8 zero
+/// u8 bits of an input, u8 snap, u8 address mode, u8 pyramid
 /// per grid: u16 channels, u8 bits, u8 log2 of the scale, u8 sampling, u8 zero
 /// u16 channels, per channel: u8 output format
 /// ```
@@ -46,7 +47,7 @@ pub(super) fn write_shape(shape: &Shape) -> Vec<u8> {
     out.extend([shape.mip_count, shape.octaves]);
     out.extend([shape.wave.code(), shape.padding]);
     out.extend([shape.input_bits, shape.snap.code()]);
-    out.extend([shape.address_mode.code(), 0]);
+    out.extend([shape.address_mode.code(), shape.pyramid.code()]);
     for grid in shape.grids {
         out.extend(grid.channels.to_le_bytes());
         out.extend([grid.format.bits(), grid.scale_log2]);
@@ -72,7 +73,11 @@ pub(super) fn read_shape(body: &[u8]) -> Result<Shape, AssetError> {
         AddressMode::ALL.len(),
         AddressMode::from_code,
     )?;
-    zeros(&mut cursor, "shape.reserved", 1)?;
+    let code = cursor.u8()?;
+    let pyramid = Pyramid::from_code(code).ok_or_else(|| {
+        let allowed = "0, or 16·first + each with 1 ≤ each ≤ first";
+        AssetError::field("shape.pyramid", code, allowed)
+    })?;
     let mut grid = |index: usize| -> Result<GridShape, AssetError> {
         let field = |name: &str| format!("shape.grid{index}.{name}");
         let channels = cursor.u16()?;
@@ -122,6 +127,7 @@ pub(super) fn read_shape(body: &[u8]) -> Result<Shape, AssetError> {
         input_bits,
         snap,
         address_mode,
+        pyramid,
         grids,
         outputs,
     })

@@ -13,6 +13,7 @@ mod state;
 use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 
 /// A chain of `mip_count` mips with these channels; its grids take no part in sampling.
@@ -33,6 +34,7 @@ pub(crate) fn shape(size: [u32; 2], mip_count: u8, outputs: &[OutputFormat]) -> 
         input_bits: 8,
         snap: CornerSnap::Cell,
         address_mode: AddressMode::Wrap,
+        pyramid: Pyramid::SINGLE,
         grids: [grid; 2],
         outputs: outputs.to_vec(),
     }

@@ -8,6 +8,7 @@ use ntmu_isa::half::Half;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Skip};
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
@@ -124,6 +125,7 @@ pub(crate) fn asset(kind: Kind, size: u32) -> Asset {
         input_bits: 8,
         snap: CornerSnap::Cell,
         address_mode: AddressMode::Wrap,
+        pyramid: Pyramid::SINGLE,
         grids: [0, 1].map(|grid: usize| GridShape {
             channels: kind.grids[grid],
             format: four,

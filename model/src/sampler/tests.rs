@@ -2,6 +2,7 @@ use super::*;
 use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::sampler::{Address, Detail, Filter, Footprint, MipBlend, MipFilter, Order};
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling};
 use std::cell::RefCell;
@@ -37,6 +38,7 @@ impl Marked {
             input_bits: 8,
             snap: CornerSnap::Cell,
             address_mode: AddressMode::Wrap,
+            pyramid: Pyramid::SINGLE,
             grids: [grid; 2],
             outputs: vec![OutputFormat::Unorm16; 3],
         };

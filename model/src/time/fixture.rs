@@ -14,6 +14,7 @@ use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
 use ntmu_isa::layout::Layout;
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
@@ -118,6 +119,7 @@ pub(super) fn asset(sketch: &Sketch) -> Asset {
         input_bits: 8,
         snap: CornerSnap::Cell,
         address_mode: AddressMode::Wrap,
+        pyramid: Pyramid::SINGLE,
         grids: [
             grid(first, Sampling::Corners),
             grid(second, Sampling::Interpolated),

@@ -10,6 +10,7 @@ mod specs;
 use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
 use ntmu_isa::sampler::footprint::{Footprint, GRADIENT_BITS};
 use ntmu_isa::sampler::{Address, Detail, Filter, MipFilter, Order, SampleRequest, Sampler};
@@ -39,6 +40,7 @@ pub(crate) fn shape(width: u32, height: u32) -> Shape {
         input_bits: 8,
         snap: CornerSnap::Cell,
         address_mode: AddressMode::Wrap,
+        pyramid: Pyramid::SINGLE,
         grids: [grid; 2],
         outputs: vec![OutputFormat::Unorm8; 3],
     }

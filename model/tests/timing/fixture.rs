@@ -8,6 +8,7 @@ use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
 use ntmu_isa::layout::Layout;
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
@@ -99,6 +100,7 @@ pub(crate) fn shape(size: u32, grid_channels: [u16; 2], octaves: u8, channels: u
         input_bits: 8,
         snap: CornerSnap::Cell,
         address_mode: AddressMode::Wrap,
+        pyramid: Pyramid::SINGLE,
         grids: [
             grid(first, Sampling::Corners),
             grid(second, Sampling::Interpolated),

@@ -11,6 +11,7 @@ use ntmu_isa::half::{Half, SumOrder};
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
 use ntmu_isa::rescale::{Multiplier, Requantizer};
 use ntmu_isa::round::Rounding;
@@ -63,6 +64,7 @@ pub(crate) fn shape(
         input_bits: 8,
         snap: CornerSnap::Cell,
         address_mode: AddressMode::Wrap,
+        pyramid: Pyramid::SINGLE,
         grids: [
             grid(first, Sampling::Corners),
             grid(second, Sampling::Interpolated),

@@ -2,6 +2,7 @@ use super::*;
 use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::sampler::{Detail, Footprint, SampleRequest};
 use ntmu_isa::shape::{GridShape, Sampling};
 use ntmu_model::sampler::{Decode, Probes, Texture};
@@ -33,6 +34,7 @@ impl Noise {
             input_bits: 8,
             snap: CornerSnap::Cell,
             address_mode: AddressMode::Wrap,
+            pyramid: Pyramid::SINGLE,
             grids: [grid; 2],
             outputs: OutputFormat::ALL.to_vec(),
         };
