@@ -39,6 +39,8 @@ pub mod report;
 pub mod study;
 pub mod texture_set;
 pub mod timing;
+#[cfg(feature = "train")]
+pub mod training_source;
 #[cfg(feature = "gpu")]
 pub mod twin_device;
 

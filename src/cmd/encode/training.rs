@@ -6,13 +6,12 @@ use crate::{console, files};
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use ntmu::decoded::Decoded;
-use ntmu::isa::asset::Map;
-use ntmu::isa::shape::OutputFormat;
 use ntmu::quality::{self, Quality};
 use ntmu::texture_set::TextureSet;
 use ntmu::trainer::{
-    self, EFFORTS, Precision, Preset, Progress, Source, TrainConfig, TrainError, Trained,
+    self, EFFORTS, Precision, Preset, Progress, TrainConfig, TrainError, Trained,
 };
+use ntmu::training_source::training_source;
 use ntmu::{beside, built_in};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -32,7 +31,7 @@ impl Encode {
         }
         let checkpoint = self.checkpoint_path();
         self.check_places(&checkpoint)?;
-        let source = source_of(&set);
+        let source = training_source(&set);
         let started = Instant::now();
         let stop = stop_on_interrupt()?;
         let mut line = Line::new();
@@ -210,64 +209,6 @@ fn stop_on_interrupt() -> anyhow::Result<Arc<AtomicBool>> {
     })
     .context("cannot watch for interrupts")?;
     Ok(stop)
-}
-
-/// A texture set as the trainer takes it.
-fn source_of(set: &TextureSet) -> Source {
-    let mut maps: Vec<Map> = Vec::new();
-    let mut outputs = Vec::new();
-    for map in &set.maps {
-        let name = unused(&plain_name(&map.name), &maps);
-        // A map stored at more than 8 bits leaves the unit at 16.
-        let format = if map.bit_depth == 8 {
-            OutputFormat::Unorm8
-        } else {
-            OutputFormat::Unorm16
-        };
-        outputs.extend(std::iter::repeat_n(format, map.channel_count));
-        maps.push(Map {
-            name,
-            first_channel: map.first_channel as u16,
-            channel_count: map.channel_count as u16,
-            encoding: map.encoding,
-            bit_depth: map.bit_depth,
-        });
-    }
-    Source {
-        name: set.name.clone(),
-        mips: set.texels.clone(),
-        outputs,
-        maps,
-    }
-}
-
-/// A map's name as the format allows it: it becomes a file name.
-fn plain_name(name: &str) -> String {
-    let plain = |c: char| {
-        if c.is_ascii_alphanumeric() || c == '_' || c == '-' {
-            c
-        } else {
-            '_'
-        }
-    };
-    let name: String = name.chars().map(plain).take(60).collect();
-    if name.is_empty() {
-        "map".to_owned()
-    } else {
-        name
-    }
-}
-
-/// The name, with a number where another map has it.
-fn unused(name: &str, maps: &[Map]) -> String {
-    let is_free = |candidate: &str| maps.iter().all(|map| map.name != candidate);
-    if is_free(name) {
-        return name.to_owned();
-    }
-    let numbered = (2..)
-        .map(|number| format!("{name}_{number}"))
-        .find(|n| is_free(n));
-    numbered.unwrap_or_else(|| name.to_owned())
 }
 
 /// The progress line: stage, step, loss, PSNR estimate, time left.
