@@ -8,9 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use ntmu::decoded::Decoded;
 use ntmu::quality::{self, Quality};
 use ntmu::texture_set::TextureSet;
-use ntmu::trainer::{
-    self, EFFORTS, Precision, Preset, Progress, TrainConfig, TrainError, Trained,
-};
+use ntmu::trainer::{self, EFFORTS, Precision, Preset, Progress, TrainConfig, TrainError, Trained};
 use ntmu::training_source::training_source;
 use ntmu::{beside, built_in};
 use serde_json::json;
