@@ -42,7 +42,7 @@ enum Verb {
     /// Decode, check, time and sweep an asset, and write a report; the built-in one by default.
     Study(study::Study),
     /// Train an asset on a texture set.
-    Encode(encode::Encode),
+    Encode(Box<encode::Encode>),
     /// Decode an asset to image files.
     Decode(decode::Decode),
     /// Show what an asset holds.

@@ -6,8 +6,10 @@ use crate::engine::{Engine, View};
 use crate::error::TrainError;
 use crate::model::{Ground, Model};
 use crate::network::Network;
+use crate::plan::{Mips, Shown};
 use crate::random::{Purpose, Stream, half_unit_noise};
 use crate::sampler::{Numbers, Texel, Window};
+use crate::stage::{Rates, Stage};
 use ntmu_isa::position::AddressMode;
 
 /// Texels of an encoder position along an axis.
@@ -16,9 +18,13 @@ const POSITION: u32 = 1 << SCALE_LOG2;
 /// Positions along an axis of one piece when the whole set is encoded.
 const PIECE: u32 = 32;
 
-/// log2 of the crop's side over that of the coarsest mip that is trained on it: a coarser one's
-/// corners would all lie outside the crop.
+/// log2 of the texels, along a crop's longer side, of the coarsest mip of [`Mips::Corners`]: all
+/// corners of a coarser one would lie outside the crop.
 const MIP_MARGIN: u32 = 3;
+
+/// How often a texel of a crop that is masked out is drawn anew. One that stays masked out counts
+/// nothing.
+const DRAWS: u64 = 8;
 
 /// The crops of one step, in encoder positions.
 #[derive(Clone, Debug)]
@@ -29,16 +35,20 @@ pub(crate) struct Crops {
     size: [u32; 2],
     /// The first position of each crop.
     origins: Vec<[u32; 2]>,
+    /// Mips that texels are drawn from.
+    mips: u8,
+    /// The share of texels whose mip is drawn uniformly.
+    uniform: f64,
 }
 
 impl Crops {
     /// The crops of a step. A crop wraps around the set where its grids do.
-    pub(crate) fn draw(ground: &Ground<'_>, step: u64) -> Crops {
+    pub(crate) fn draw(ground: &Ground<'_>, stage: &Stage, step: u64) -> Crops {
         let config = ground.config;
         let (width, height) = ground.texels.sizes[0];
         let all = [width, height].map(|n| n.div_ceil(POSITION));
-        let size = all.map(|n| n.min(config.crop / POSITION));
-        let stream = Stream::new(config.seed, Purpose::Crop, step);
+        let size = all.map(|n| n.min(stage.crop / POSITION));
+        let stream = Stream::new(config.seed, Purpose::Crop, stage.stream(step));
         let wraps = AddressMode::from(config.address) == AddressMode::Wrap;
         let origin = |index: u64, axis: usize| {
             let free = all[axis] - size[axis];
@@ -51,9 +61,21 @@ impl Crops {
         };
         // Crops that are the whole set would all be the same.
         let whole = all == size;
-        let items = if whole { 1 } else { u64::from(config.crops) };
+        let items = if whole { 1 } else { u64::from(stage.crops) };
         let origins = (0..items).map(|i| [origin(i, 0), origin(i, 1)]).collect();
-        Crops { all, size, origins }
+        let chain = ground.texels.sizes.len() as u8;
+        let mips = if whole {
+            chain
+        } else {
+            mips_of(size[0].max(size[1]) * POSITION, stage.mips).min(chain)
+        };
+        Crops {
+            all,
+            size,
+            origins,
+            mips,
+            uniform: stage.uniform_mips,
+        }
     }
 
     fn shape(&self) -> (usize, usize, usize) {
@@ -83,17 +105,27 @@ impl Crops {
 
     /// Texel `index` of a batch of `len`: the crops share the batch in equal runs.
     fn texel(&self, ground: &Ground<'_>, stream: Stream, index: usize, len: usize) -> Texel {
-        let window = index * self.origins.len() / len;
-        let sizes = &ground.texels.sizes;
-        let at = 4 * index as u64;
-        let uniform = ground.config.uniform_mips;
-        let side = self.size[0].max(self.size[1]) * POSITION;
-        let deepest = if self.size == self.all {
-            sizes.len() as u8
-        } else {
-            (side.ilog2().saturating_sub(MIP_MARGIN) as u8 + 1).min(sizes.len() as u8)
+        let drawn = |draw: u64| {
+            let at = 4 * (index as u64 + draw * len as u64);
+            self.place(
+                &ground.texels.sizes,
+                stream,
+                at,
+                index * self.origins.len() / len,
+            )
         };
-        let mip = crate::batch::draw_mip(stream.unit(at), stream.unit(at + 1), deepest, uniform);
+        let covered = |texel: &Texel| ground.texels.is_covered(texel.x, texel.y, texel.mip);
+        let first = drawn(0);
+        if covered(&first) {
+            return first;
+        }
+        (1..DRAWS).map(drawn).find(covered).unwrap_or(first)
+    }
+
+    /// The texel of crop `window` that the numbers of `stream` from `at` on say.
+    fn place(&self, sizes: &[(u32, u32)], stream: Stream, at: u64, window: usize) -> Texel {
+        let (choice, unit) = (stream.unit(at), stream.unit(at + 1));
+        let mip = crate::batch::draw_mip(choice, unit, self.mips, self.uniform);
         let place = |axis: usize, texels: u32| {
             let inside = stream.below(
                 at + 2 + axis as u64,
@@ -116,6 +148,15 @@ impl Crops {
             window: window as u16,
         }
     }
+}
+
+/// Mips that a crop with this longer side trains.
+fn mips_of(side: u32, mips: Mips) -> u8 {
+    let deepest = match mips {
+        Mips::Inside => side.ilog2(),
+        Mips::Corners => side.ilog2().saturating_sub(MIP_MARGIN),
+    };
+    deepest as u8 + 1
 }
 
 /// Channels, rows and columns of mip 0 from a position on, `[channel][row][column]`; beyond the
@@ -146,17 +187,19 @@ impl Model {
         self.encoder_moments = crate::adam::Moments::zero(self.encoder.len());
     }
 
-    /// One step on crops, with learning rates for the encoder and for the synthesizer.
+    /// One step of a stage on crops; the mean squared error of its batch.
     pub(crate) fn encoder_step(
         &mut self,
         ground: &Ground<'_>,
         engine: &mut Engine,
+        stage: &Stage,
         step: u64,
-        rates: [f64; 2],
+        rates: Rates,
     ) -> Result<f64, TrainError> {
         let config = ground.config;
+        let at = stage.stream(step);
         let encoder = Encoder::new(config, ground.texels.channels);
-        let crops = Crops::draw(ground, step);
+        let crops = Crops::draw(ground, stage, step);
         let (items, rows, columns) = crops.shape();
         let size = crops.size.map(|n| (n * POSITION) as usize);
         let mut images = Vec::with_capacity(items * ground.texels.channels * size[0] * size[1]);
@@ -172,7 +215,7 @@ impl Model {
         let shape = [items, ground.texels.channels, size[1], size[0]];
         let pass = encoder.forward(&self.encoder, images, shape, true);
         let grids = pass.grids()?;
-        let noise = Stream::new(config.seed, Purpose::Noise, step).noise_key();
+        let noise = Stream::new(config.seed, Purpose::Noise, at).noise_key();
         let seen = [0, 1].map(|g: usize| {
             let format = self.latents[g].format;
             let codes = (1_u32 << format.bits()) as f32;
@@ -184,22 +227,34 @@ impl Model {
                 channels,
                 config.grids[g].scale_log2,
                 |from, to| {
-                    let noise = half_unit_noise(noise.wrapping_add(g as u32), to as u32);
-                    seen[to] = (grids[g][from] * codes).clamp(low, high) + noise;
+                    let value = (grids[g][from] * codes).clamp(low, high);
+                    seen[to] = match stage.latents {
+                        Shown::Noise => {
+                            value + half_unit_noise(noise.wrapping_add(g as u32), to as u32)
+                        }
+                        Shown::Rounded => (value + 0.5).floor().clamp(low, high),
+                    };
                 },
             );
             seen
         });
-        let stream = Stream::new(config.seed, Purpose::Batch, step);
+        let stream = Stream::new(config.seed, Purpose::Batch, at);
         let len = engine.batch.texels.len();
         for index in 0..len {
             engine.batch.texels[index] = crops.texel(ground, stream, index, len);
         }
         let windows = crops.windows(ground);
-        let network = Network::real(&ground.topology, &self.parameters, &ground.low);
-        let embedding = ground.embedding(Numbers::Real);
+        let quantised = stage.is_deployed().then(|| self.quantised(ground));
+        let real;
+        let (network, embedding) = match &quantised {
+            Some(quantised) => (&quantised.network, ground.embedding(Numbers::Integer)),
+            None => {
+                real = Network::real(&ground.topology, &self.parameters, &ground.low);
+                (&real, ground.embedding(Numbers::Real))
+            }
+        };
         let loss = engine.step(View {
-            network: &network,
+            network,
             embedding,
             positions: &ground.positions,
             windows: &windows,
@@ -209,8 +264,11 @@ impl Model {
         let mut gradients = [0, 1].map(|g: usize| vec![0.0; seen[g].len()]);
         let [g0, g1] = &mut gradients;
         engine.scatter(embedding, [g0, g1]);
+        let units = embedding.latent_unit();
         let of_tensors = [0, 1].map(|g: usize| {
             let mut out = vec![0.0; gradients[g].len()];
+            // A real latent in units of an input: 1 where inputs are reals.
+            let unit = units[g] * (1_u32 << self.latents[g].format.bits()) as f32;
             let channels = usize::from(config.grids[g].channels);
             for_latents(
                 (items, rows, columns),
@@ -218,16 +276,20 @@ impl Model {
                 config.grids[g].scale_log2,
                 |from, to| {
                     // Beyond the range only a gradient that leads back counts.
-                    let (real, gradient) = (grids[g][from], gradients[g][to]);
+                    let (real, gradient) = (grids[g][from], unit * gradients[g][to]);
                     let outward = (real > 0.5 && gradient < 0.0) || (real < -0.5 && gradient > 0.0);
                     out[from] = if outward { 0.0 } else { gradient };
                 },
             );
             out
         });
+        if let Some(quantised) = &quantised {
+            quantised.to_real_gradient(&ground.topology, &mut engine.parameters);
+        }
         ground.hold_constants(&mut engine.parameters);
         let gradient = encoder.backward(pass, of_tensors)?;
-        let [of_encoder, of_synthesizer] = rates.map(|rate| Rate::new(rate, step + 1));
+        let of_encoder = Rate::new(rates.encoder, step + 1);
+        let of_synthesizer = Rate::new(rates.synthesizer, step + 1);
         self.encoder_moments
             .update(of_encoder, &mut self.encoder, &gradient);
         self.moments

@@ -1,13 +1,12 @@
 //! The trainer's numbers are isa's.
 
 use super::by_isa::{decode, inputs};
-use super::{run, small, source};
+use super::{run, small, source, usual};
 use crate::batch::all_texels;
 use crate::model::Ground;
 use crate::sampler::{Numbers, Texel, Window};
 use crate::{
-    ActivationKind, Address, GridSampling, Precision, Snap, Source, Steps, TrainConfig, Trained,
-    WaveForm,
+    ActivationKind, Address, GridSampling, Precision, Snap, Source, TrainConfig, Trained, WaveForm,
 };
 
 /// Configurations that between them use every kind of input.
@@ -47,15 +46,11 @@ fn embeddings() -> Vec<TrainConfig> {
 
 #[test]
 fn the_sampler_gives_isas_integers_at_every_texel() {
-    let steps = Steps {
-        encoder: 0,
-        refine: 1,
-        integer: 1,
-    };
+    let plan = usual([0, 1, 1]);
     for config in embeddings() {
         let source = source(45, 70, 7);
         let config = TrainConfig {
-            steps: Some(steps),
+            plan: Some(plan.clone()),
             ..config
         };
         let asset = run(&source, &config).unwrap().asset;
@@ -201,11 +196,7 @@ fn halves_exported_from_reals_keep_the_quality() {
         let config = TrainConfig {
             activation,
             precision: Precision::Fp16,
-            steps: Some(Steps {
-                encoder: 0,
-                refine: 400,
-                integer: 0,
-            }),
+            plan: Some(usual([0, 400, 0])),
             ..small()
         };
         let trained = run(&source, &config).unwrap();
@@ -225,11 +216,7 @@ fn constant_channels_are_reproduced_exactly_beside_others() {
     for precision in [Precision::Int8, Precision::Fp16] {
         let config = TrainConfig {
             precision,
-            steps: Some(Steps {
-                encoder: 0,
-                refine: 20,
-                integer: 20,
-            }),
+            plan: Some(usual([0, 20, 20])),
             ..small()
         };
         let asset = run(&source, &config).unwrap().asset;
