@@ -1,6 +1,6 @@
 //! Everything that decides what a training run makes.
 
-use crate::choices::{ActivationKind, Address, GridSampling, Precision, Snap, WaveForm};
+use crate::choices::{ActivationKind, Address, GridSampling, Precision, Pyramid, Snap, WaveForm};
 use crate::error::TrainError;
 use crate::plan::Plan;
 use ntmu_isa::embed::WAVES_PER_OCTAVE;
@@ -29,6 +29,10 @@ pub struct GridConfig {
 pub struct TrainConfig {
     /// Grid 0 and grid 1.
     pub grids: [GridConfig; 2],
+    /// Which level of the grids serves a mip: `"single"`, `"ntc"`, `"every-mip"`, or
+    /// `{ first = 4, each = 2 }`.
+    #[serde(with = "crate::choices::pyramid")]
+    pub pyramid: Pyramid,
     /// What each grid gives the synthesizer. CNTC concatenates the corners of grid 0 and
     /// interpolates grid 1.
     pub sampling: [GridSampling; 2],

@@ -11,6 +11,7 @@
 //! |---|---|
 //! | [`Source`], [`TrainConfig`], [`Preset`] | what goes in |
 //! | `positions`, `sampler` | which inputs a texel has: isa's integer formulas, tabulated |
+//! | `encoder`, `constructor`, `crop` | latents from an encoder, level by level |
 //! | `topology`, `network`, `epilogue`, `tile`, `kernel` | the synthesizer, forward and backward |
 //! | `quantise`, `integer`, `half`, `calibrate` | the numbers of the decode that stand for it |
 //! | `export` | the asset |
@@ -28,6 +29,7 @@ mod check_config;
 mod checkpoint;
 mod choices;
 mod config;
+mod constructor;
 mod crop;
 mod encoder;
 mod engine;
@@ -61,7 +63,9 @@ mod tile;
 mod topology;
 mod train;
 
-pub use choices::{ActivationKind, Address, GridSampling, Precision, Snap, WaveForm};
+pub use choices::{
+    ActivationKind, Address, GridSampling, PYRAMIDS, Precision, Pyramid, Snap, WaveForm,
+};
 pub use config::{GridConfig, TrainConfig};
 pub use error::{Good, TrainError};
 pub use memory::Memory;

@@ -98,10 +98,9 @@ impl Model {
     pub(crate) fn new(ground: &Ground<'_>) -> Result<Model, TrainError> {
         let seed = ground.config.seed;
         let grid = |g: usize| -> Result<Latents, TrainError> {
-            let (width, height) = ground.positions.grid_sizes[g];
             Ok(Latents::new(
                 ground.config.grid_shape(g)?,
-                width as usize * height as usize,
+                ground.positions.cells(g),
             ))
         };
         let mut latents = [grid(0)?, grid(1)?];

@@ -134,7 +134,8 @@ pub struct Plan {
 }
 
 /// The plans that come with the trainer, by name.
-const PLANS: [(&str, &str); 4] = [
+const PLANS: [(&str, &str); 5] = [
+    ("ntc", include_str!("../../plans/ntc.toml")),
     ("paper", include_str!("../../plans/paper.toml")),
     ("paper-short", include_str!("../../plans/paper-short.toml")),
     ("direct", include_str!("../../plans/direct.toml")),

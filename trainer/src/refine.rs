@@ -59,7 +59,7 @@ impl Model {
             })
             .collect();
         let network = self.real(ground);
-        let windows = [Window::whole(&ground.positions)];
+        let windows = Window::whole(&ground.positions);
         let view = self.view(ground, &network, Numbers::Real, &windows);
         let bits = ground.config.activation_bits;
         calibrate(&ground.topology, view, &texels, bits)
@@ -108,7 +108,7 @@ impl Model {
         engine
             .batch
             .draw(stream, &ground.texels, stage.uniform_mips);
-        let windows = [Window::whole(&ground.positions)];
+        let windows = Window::whole(&ground.positions);
         let loss = match &quantised {
             Some(q) => engine.step(self.view(ground, &q.network, numbers, &windows)),
             None => {
@@ -143,7 +143,7 @@ impl Model {
             Numbers::Real => self.real(ground),
             Numbers::Integer => self.quantised(ground).network,
         };
-        let windows = [Window::whole(&ground.positions)];
+        let windows = Window::whole(&ground.positions);
         evaluate(
             &ground.topology,
             self.view(ground, &network, numbers, &windows),

@@ -3,7 +3,9 @@
 mod by_isa;
 mod integers;
 mod loss;
+mod ntc;
 mod plans;
+mod pyramids;
 mod runs;
 mod safety;
 

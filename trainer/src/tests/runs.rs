@@ -89,7 +89,10 @@ fn every_preset_is_valid_and_makes_an_asset_of_its_sizes() {
         let outputs = source.outputs.clone();
         let mip_count = source.mips.len() as u8;
         let asset = &trained.asset;
-        let shape = preset.shape(asset.shape.width, asset.shape.height, mip_count, outputs);
+        let shape = Shape {
+            pyramid: config.pyramid,
+            ..preset.shape(asset.shape.width, asset.shape.height, mip_count, outputs)
+        };
         assert_eq!(asset.shape, shape, "{}", preset.name);
         let layers = asset.layers.iter();
         let sizes: Vec<(u16, u16)> = layers.map(|l| (l.inputs, l.outputs)).collect();
