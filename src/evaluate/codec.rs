@@ -23,6 +23,8 @@ pub struct Neural {
     pub preset: String,
     /// The preset's own where left out.
     pub effort: Option<Effort>,
+    /// The name of a training plan in the place of the effort's: `paper-short`, `ntc`, …
+    pub plan: Option<String>,
     /// The arithmetic of every layer, by name; the preset's own where left out.
     pub precision: Option<String>,
     /// Fields of the training configuration that replace the preset's.

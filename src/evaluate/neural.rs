@@ -54,7 +54,7 @@ mod with_trainer {
     use super::{AtomicBool, EvaluateError, Neural, Path, TextureSet, Trained};
     use crate::decoded::Decoded;
     use crate::quality;
-    use crate::trainer::{self, EFFORTS, Precision, Preset, TrainConfig};
+    use crate::trainer::{self, EFFORTS, Plan, Precision, Preset, TrainConfig};
     use crate::training_source::training_source;
     use std::time::Instant;
 
@@ -104,6 +104,9 @@ mod with_trainer {
         let mut config = Preset::by_name(&codec.preset)?.config();
         if let Some(effort) = &codec.effort {
             config = config.with_effort(number(codec, effort)?);
+        }
+        if let Some(plan) = &codec.plan {
+            config.plan = Some(Plan::by_name(plan)?);
         }
         config.seed = codec.seed;
         if let Some(name) = &codec.precision {

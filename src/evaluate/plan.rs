@@ -9,7 +9,8 @@
 //! name = "CNTC"
 //! codec = "neural"
 //! presets = ["cntc-16", "cntc-32", "cntc-64"]
-//! effort = "medium"                         # optional, as are the next two
+//! effort = "medium"                         # optional, as are the next three
+//! plan = "direct"                           # a training plan, in the place of the effort's
 //! precision = "int8"
 //! config = { uniform_mips = 0.05 }          # fields of the training configuration
 //!
@@ -108,6 +109,7 @@ enum RawCurve {
         name: String,
         presets: Vec<String>,
         effort: Option<Effort>,
+        plan: Option<String>,
         precision: Option<String>,
         #[serde(default)]
         config: BTreeMap<String, serde_json::Value>,
@@ -240,6 +242,7 @@ fn planned(curve: RawCurve, seed: u64) -> Result<PlannedCurve, Refusal> {
             name,
             presets,
             effort,
+            plan,
             precision,
             config,
         } => {
@@ -256,6 +259,7 @@ fn planned(curve: RawCurve, seed: u64) -> Result<PlannedCurve, Refusal> {
                 Codec::Neural(Neural {
                     preset,
                     effort: effort.clone(),
+                    plan: plan.clone(),
                     precision: precision.clone(),
                     config: config.clone(),
                     seed,
