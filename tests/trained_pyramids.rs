@@ -6,7 +6,7 @@ mod support;
 
 use ntmu::decoded::Decoded;
 use ntmu::isa::Asset;
-use ntmu::trainer::{self, Precision, Preset, Pyramid, Source, Steps, TrainConfig};
+use ntmu::trainer::{self, Precision, Preset, Pyramid, Source, TrainConfig};
 use std::sync::atomic::AtomicBool;
 
 /// The decibels of the model's codes, mip by mip.
@@ -24,14 +24,10 @@ fn decibels(asset: &Asset, source: &Source) -> Vec<f64> {
 }
 
 fn assert_decoded_as_trained(config: &TrainConfig, levels: u8) {
-    let source = support::source::brick_wall(64);
+    let source = support::source::brick_wall(256);
     let config = TrainConfig {
         batch: 768,
-        steps: Some(Steps {
-            encoder: 0,
-            refine: 60,
-            integer: 30,
-        }),
+        plan: Some(config.usual_plan([0, 60, 30])),
         ..config.clone()
     };
     let stop = AtomicBool::new(false);

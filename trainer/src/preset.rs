@@ -1,6 +1,6 @@
 //! Presets: configurations with a name.
 
-use crate::choices::{Precision, Pyramid};
+use crate::choices::Precision;
 use crate::config::{GridConfig, TrainConfig};
 use crate::error::TrainError;
 use ntmu_isa::preset;
