@@ -56,7 +56,8 @@ impl Crops {
         Crops { all, size, origins }
     }
 
-    fn shape(&self) -> (usize, usize, usize) {
+    /// Crops, and the rows and columns of encoder positions of each.
+    pub(crate) fn shape(&self) -> (usize, usize, usize) {
         (
             self.origins.len(),
             self.size[1] as usize,
@@ -64,7 +65,8 @@ impl Crops {
         )
     }
 
-    fn windows(&self, ground: &Ground<'_>) -> Vec<Window> {
+    /// The window that each crop is.
+    pub(crate) fn windows(&self, ground: &Ground<'_>) -> Vec<Window> {
         let scale = |g: usize| SCALE_LOG2 - ground.config.grids[g].scale_log2;
         let cells = |of: [u32; 2]| [0, 1].map(|g: usize| of.map(|n| n << scale(g)));
         let size = cells(self.size);
@@ -81,8 +83,33 @@ impl Crops {
         windows.collect()
     }
 
+    /// The columns and the rows of mip 0 that each crop shows; one that wraps leaves the set on one
+    /// side and enters it on the other.
+    pub(crate) fn lines(&self, ground: &Ground<'_>) -> Vec<[Vec<u32>; 2]> {
+        let (width, height) = ground.texels.sizes[0];
+        let mode = AddressMode::from(ground.config.address);
+        let line = |first: u32, count: u32, texels: u32| {
+            let first = (first * POSITION) as i32;
+            let line = first..first + (count * POSITION) as i32;
+            line.map(|at| mode.resolve(at, texels)).collect()
+        };
+        let of = |origin: &[u32; 2]| {
+            [
+                line(origin[0], self.size[0], width),
+                line(origin[1], self.size[1], height),
+            ]
+        };
+        self.origins.iter().map(of).collect()
+    }
+
     /// Texel `index` of a batch of `len`: the crops share the batch in equal runs.
-    fn texel(&self, ground: &Ground<'_>, stream: Stream, index: usize, len: usize) -> Texel {
+    pub(crate) fn texel(
+        &self,
+        ground: &Ground<'_>,
+        stream: Stream,
+        index: usize,
+        len: usize,
+    ) -> Texel {
         let window = index * self.origins.len() / len;
         let sizes = &ground.texels.sizes;
         let at = 4 * index as u64;

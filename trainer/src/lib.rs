@@ -15,6 +15,8 @@
 //! | `quantise`, `integer`, `half`, `calibrate` | the numbers of the decode that stand for it |
 //! | `export` | the asset |
 //! | `latents`, `adam`, `batch`, `engine`, `refine` | a step on the whole set |
+//! | `encoder`, `convolution`, `crop` | CNTC's encoder, and a step on crops |
+//! | `device`, `graph` | the steps in reals on a GPU, through burn |
 //! | `schedule`, `train`, `checkpoint`, `report` | the run |
 
 #![forbid(unsafe_code)]
@@ -26,13 +28,17 @@ mod check_config;
 mod checkpoint;
 mod choices;
 mod config;
+mod convolution;
 mod crop;
+mod device;
 mod encoder;
+mod encoder_pass;
 mod engine;
 mod epilogue;
 mod error;
 mod evaluate;
 mod export;
+mod graph;
 mod half;
 mod integer;
 mod kernel;
@@ -54,6 +60,7 @@ mod train;
 
 pub use choices::{ActivationKind, Address, GridSampling, Precision, Snap, WaveForm};
 pub use config::{GridConfig, Steps, TrainConfig};
+pub use device::{Backend, TrainingDevice};
 pub use error::TrainError;
 pub use preset::Preset;
 pub use report::{Progress, StageReport, TrainReport, Trained};

@@ -17,7 +17,7 @@ use crate::schedule::Stage;
 const CALIBRATION: usize = 4096;
 
 /// The numbers of a stage's random streams: no two stages share one.
-const fn stream_step(stage: Stage, step: u64) -> u64 {
+pub(crate) const fn stream_step(stage: Stage, step: u64) -> u64 {
     ((stage as u64) << 48) | step
 }
 

@@ -2,10 +2,12 @@
 
 use crate::checkpoint::{self, Position};
 use crate::config::{Steps, TrainConfig};
+use crate::device::{Backend, TrainingDevice};
 use crate::engine::Engine;
 use crate::error::TrainError;
 use crate::evaluate::decibels;
 use crate::export;
+use crate::graph::{Graph, Subject};
 use crate::model::{Ground, Model};
 use crate::quantise::Widths;
 use crate::refine::Rates;
@@ -25,6 +27,10 @@ const SMOOTHING: f64 = 0.02;
 
 /// Trains an asset for `source`.
 ///
+/// The stages in reals run on `device`; what follows them, in the decode's own numbers, and the
+/// evaluations run on the processor. With a GPU the state is there only between two of its saves,
+/// and a run may be resumed on another device than it began on.
+///
 /// With `checkpoint`, the state is written there every [`TrainConfig::checkpoint_every`] steps and
 /// when `stop` becomes true. With `resume` as well, a run goes on from the file if it exists, and
 /// ends with the bytes that the uninterrupted run would have ended with. `observer` hears of every
@@ -36,6 +42,7 @@ const SMOOTHING: f64 = 0.02;
 pub fn train(
     source: &Source,
     config: &TrainConfig,
+    device: &TrainingDevice,
     checkpoint: Option<&Path>,
     resume: bool,
     stop: &AtomicBool,
@@ -57,6 +64,7 @@ pub fn train(
         ground,
         steps,
         identity,
+        device,
         checkpoint,
         stop,
         observer,
@@ -78,6 +86,7 @@ struct Run<'a> {
     position: Position,
     steps: Steps,
     identity: u64,
+    device: &'a TrainingDevice,
     checkpoint: Option<&'a Path>,
     stop: &'a AtomicBool,
     observer: &'a mut dyn FnMut(&Progress),
@@ -142,39 +151,46 @@ impl Run<'_> {
             .map(|&s| self.steps.of(s))
             .sum();
         let mut smooth = None;
+        let mut graph = self.graph(stage);
+        let batch = engine.batch.texels.len();
         while self.position.step < steps {
             if self.stop.load(Ordering::Relaxed) {
-                self.save()?;
+                self.save(graph.as_ref())?;
                 return Err(TrainError::Stopped {
                     stage: stage.name(),
                     step: self.position.step,
                     checkpoint: self.checkpoint.map(Path::to_owned),
                 });
             }
-            let step = self.position.step;
-            let rates = self.rates(stage, step);
-            let loss = match stage {
-                Stage::Encoder => {
-                    let factor = schedule::factor(step, steps);
-                    let rates = [factor * self.ground.config.encoder_rate, rates.synthesizer];
-                    self.model.encoder_step(&self.ground, engine, step, rates)?
-                }
-                Stage::Refine | Stage::Integer => {
-                    self.model.step(&self.ground, engine, stage, step, rates)
+            let step = self.position.step + 1;
+            let saves = step.is_multiple_of(self.ground.config.checkpoint_every);
+            let observed = step.is_multiple_of(OBSERVED) || step == steps;
+            let losses = match &mut graph {
+                None => vec![self.step(stage, engine)?],
+                Some(graph) => {
+                    let rates = self.rates(stage, step - 1);
+                    graph.step(&self.ground, (stage, step - 1, batch), rates);
+                    // Reading a loss waits for the device.
+                    if observed || saves {
+                        graph.losses()?
+                    } else {
+                        Vec::new()
+                    }
                 }
             };
-            if !loss.is_finite() {
-                return Err(TrainError::Diverged {
-                    stage: stage.name(),
-                    step,
-                    loss,
-                });
+            for (at, &loss) in losses.iter().enumerate() {
+                if !loss.is_finite() {
+                    return Err(TrainError::Diverged {
+                        stage: stage.name(),
+                        step: step - (losses.len() - at) as u64,
+                        loss,
+                    });
+                }
+                let old = smooth.unwrap_or(loss);
+                smooth = Some(old + SMOOTHING * (loss - old));
             }
-            let loss = smooth.map_or(loss, |old: f64| old + SMOOTHING * (loss - old));
-            smooth = Some(loss);
-            let step = step + 1;
             self.position.step = step;
-            if step.is_multiple_of(OBSERVED) || step == steps {
+            if let Some(loss) = smooth.filter(|_| observed) {
                 (self.observer)(&Progress {
                     stage,
                     step,
@@ -185,30 +201,64 @@ impl Run<'_> {
                     psnr: decibels(loss),
                 });
             }
-            if step.is_multiple_of(self.ground.config.checkpoint_every) {
-                self.save()?;
+            if saves {
+                self.save(graph.as_ref())?;
             }
         }
-        Ok(())
+        match graph {
+            Some(graph) => graph.write_to(&mut self.model),
+            None => Ok(()),
+        }
     }
 
-    fn rates(&self, stage: Stage, step: u64) -> Rates {
+    /// The state of a stage in reals on a device other than the processor, whose own kernels are
+    /// faster than burn's.
+    fn graph(&self, stage: Stage) -> Option<Graph> {
+        if self.device.backend() == Backend::Flex || stage == Stage::Integer {
+            return None;
+        }
+        let (subject, device) = (Subject::of(stage), self.device.tensors());
+        Some(Graph::new(&self.ground, &self.model, subject, device))
+    }
+
+    /// The next step on the processor.
+    fn step(&mut self, stage: Stage, engine: &mut Engine) -> Result<f64, TrainError> {
+        let step = self.position.step;
+        let (encoder, rates) = self.rates(stage, step);
+        match stage {
+            Stage::Encoder => {
+                let rates = [encoder, rates.synthesizer];
+                self.model.encoder_step(&self.ground, engine, step, rates)
+            }
+            Stage::Refine | Stage::Integer => {
+                Ok(self.model.step(&self.ground, engine, stage, step, rates))
+            }
+        }
+    }
+
+    /// The learning rates of a step: that of the encoder, and those of what the stages on the whole
+    /// set train.
+    fn rates(&self, stage: Stage, step: u64) -> (f64, Rates) {
         let config = self.ground.config;
         let factor = match stage {
             Stage::Encoder | Stage::Refine => schedule::factor(step, self.steps.of(stage)),
             Stage::Integer => config.integer_rate * schedule::factor(step, self.steps.integer),
         };
-        Rates {
+        let rates = Rates {
             latents: factor * config.latent_rate,
             synthesizer: factor * config.synthesizer_rate,
-        }
+        };
+        (factor * config.encoder_rate, rates)
     }
 
-    fn save(&self) -> Result<(), TrainError> {
-        match self.checkpoint {
-            Some(path) => checkpoint::write(path, self.identity, self.position, &self.model),
-            None => Ok(()),
+    fn save(&mut self, graph: Option<&Graph>) -> Result<(), TrainError> {
+        let Some(path) = self.checkpoint else {
+            return Ok(());
+        };
+        if let Some(graph) = graph {
+            graph.write_to(&mut self.model)?;
         }
+        checkpoint::write(path, self.identity, self.position, &self.model)
     }
 
     fn finish(mut self) -> Result<Trained, TrainError> {
@@ -219,6 +269,7 @@ impl Run<'_> {
             position,
             steps,
             stages,
+            device,
             ..
         } = self;
         let psnr_quantised = decibels(errors.overall());
@@ -233,6 +284,7 @@ impl Run<'_> {
             batch,
             position.psnr_float,
             psnr_quantised,
+            device,
         );
         let asset = export::asset(ground.config, ground.source, layers, codes, record)?;
         let (width, height) = ground.texels.sizes[0];
@@ -251,6 +303,8 @@ impl Run<'_> {
             macs: ground.topology.macs(),
             steps,
             seed: ground.config.seed,
+            backend: device.backend(),
+            adapter: device.adapter().map(str::to_owned),
             stages,
             config: ground.config.clone(),
         };
@@ -258,13 +312,15 @@ impl Run<'_> {
     }
 }
 
-/// The training record of the asset: what made it, nothing that differs between two equal runs.
+/// The training record of the asset: what made it, nothing that differs between two equal runs. A
+/// device is named where it decides bytes.
 fn record(
     config: &TrainConfig,
     steps: &Steps,
     batch: usize,
     psnr_float: f64,
     psnr_quantised: f64,
+    device: &TrainingDevice,
 ) -> Vec<(String, String)> {
     let grids = config
         .grids
@@ -287,5 +343,12 @@ fn record(
         ("psnr_float", format!("{psnr_float:.3}")),
         ("psnr_quantised", format!("{psnr_quantised:.3}")),
     ];
-    entries.map(|(key, value)| (key.to_owned(), value)).to_vec()
+    let device = match device.backend() {
+        Backend::Flex => None,
+        Backend::Wgpu | Backend::Vulkan | Backend::Cuda => Some(("backend", device.name())),
+    };
+    let entries = entries.into_iter().chain(device);
+    entries
+        .map(|(key, value)| (key.to_owned(), value))
+        .collect()
 }

@@ -8,7 +8,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use ntmu::decoded::Decoded;
 use ntmu::quality::{self, Quality};
 use ntmu::texture_set::TextureSet;
-use ntmu::trainer::{self, EFFORTS, Precision, Preset, Progress, TrainConfig, TrainError, Trained};
+use ntmu::trainer::{
+    self, Backend, EFFORTS, Precision, Preset, Progress, TrainConfig, TrainError, Trained,
+};
 use ntmu::training_source::training_source;
 use ntmu::{beside, built_in};
 use serde_json::json;
@@ -20,6 +22,10 @@ use std::time::{Duration, Instant};
 impl Encode {
     pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
         let config = self.config()?;
+        let device = Backend::by_name(&self.backend)?.open()?;
+        if let Some(adapter) = device.adapter() {
+            console::note(&format!("{}: {adapter}", device.backend().name()));
+        }
         let set = match &self.source {
             Some(path) if !self.built_in => TextureSet::read(path)?,
             _ => built_in::source(),
@@ -36,6 +42,7 @@ impl Encode {
         let trained = trainer::train(
             &source,
             &config,
+            &device,
             Some(&checkpoint),
             self.resume,
             &stop,

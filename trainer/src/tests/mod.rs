@@ -4,14 +4,14 @@ mod by_isa;
 mod integers;
 mod runs;
 
-use crate::{GridConfig, Source, Steps, TrainConfig, TrainError, Trained, train};
+use crate::{GridConfig, Source, Steps, TrainConfig, TrainError, Trained, TrainingDevice, train};
 use ndarray::Array3;
 use ntmu_isa::asset::{Encoding, Map};
 use ntmu_isa::shape::OutputFormat;
 use std::sync::atomic::AtomicBool;
 
 /// A set with a gradient, a checkerboard, a constant channel and one of sixteen bits.
-fn source(width: usize, height: usize, mips: usize) -> Source {
+pub(crate) fn source(width: usize, height: usize, mips: usize) -> Source {
     let outputs = vec![
         OutputFormat::Unorm8,
         OutputFormat::Unorm8,
@@ -46,7 +46,7 @@ fn source(width: usize, height: usize, mips: usize) -> Source {
     }
 }
 
-fn small() -> TrainConfig {
+pub(crate) fn small() -> TrainConfig {
     TrainConfig {
         grids: [
             GridConfig {
@@ -79,6 +79,7 @@ fn run(source: &Source, config: &TrainConfig) -> Result<Trained, TrainError> {
     train(
         source,
         config,
+        &TrainingDevice::flex(),
         None,
         false,
         &AtomicBool::new(false),

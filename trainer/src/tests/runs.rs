@@ -7,7 +7,7 @@ use crate::refine::Rates;
 use crate::schedule::Stage;
 use crate::{
     ActivationKind, GridSampling, Precision, Preset, Source, Steps, TrainConfig, TrainError,
-    WaveForm, train,
+    TrainingDevice, WaveForm, train,
 };
 use ntmu_isa::shape::Shape;
 use std::path::Path;
@@ -82,7 +82,16 @@ fn stopped_at(
     let mut observer = |p: &crate::Progress| {
         stop.store(p.done >= at, std::sync::atomic::Ordering::Relaxed);
     };
-    train(source, config, Some(path), resume, &stop, &mut observer).unwrap_err()
+    train(
+        source,
+        config,
+        &TrainingDevice::flex(),
+        Some(path),
+        resume,
+        &stop,
+        &mut observer,
+    )
+    .unwrap_err()
 }
 
 #[test]
@@ -109,7 +118,16 @@ fn a_run_stopped_in_every_stage_and_resumed_equals_the_uninterrupted_run() {
         resume = true;
     }
     let stop = AtomicBool::new(false);
-    let resumed = train(&source, &config, Some(&path), true, &stop, &mut |_| {}).unwrap();
+    let resumed = train(
+        &source,
+        &config,
+        &TrainingDevice::flex(),
+        Some(&path),
+        true,
+        &stop,
+        &mut |_| {},
+    )
+    .unwrap();
     assert_eq!(resumed.asset, whole.asset);
     assert_eq!(
         resumed.report.psnr_float.to_bits(),
@@ -124,12 +142,29 @@ fn a_foreign_a_damaged_and_a_truncated_checkpoint_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
     let stop = AtomicBool::new(true);
-    train(&source, &config, Some(&path), false, &stop, &mut |_| {}).unwrap_err();
+    train(
+        &source,
+        &config,
+        &TrainingDevice::flex(),
+        Some(&path),
+        false,
+        &stop,
+        &mut |_| {},
+    )
+    .unwrap_err();
     let good = std::fs::read(&path).unwrap();
     let stop = AtomicBool::new(false);
     let resumed = |config: &TrainConfig, bytes: &[u8]| {
         std::fs::write(&path, bytes).unwrap();
-        train(&source, config, Some(&path), true, &stop, &mut |_| {})
+        train(
+            &source,
+            config,
+            &TrainingDevice::flex(),
+            Some(&path),
+            true,
+            &stop,
+            &mut |_| {},
+        )
     };
     let other = resumed(
         &TrainConfig {
@@ -207,7 +242,16 @@ fn a_loss_that_is_no_number_names_its_step() {
     model.start_encoder(&ground);
     checkpoint::write(&path, identity, position, &model).unwrap();
     let stop = AtomicBool::new(false);
-    let error = train(&source, &config, Some(&path), true, &stop, &mut |_| {}).unwrap_err();
+    let error = train(
+        &source,
+        &config,
+        &TrainingDevice::flex(),
+        Some(&path),
+        true,
+        &stop,
+        &mut |_| {},
+    )
+    .unwrap_err();
     assert!(
         matches!(
             error,
