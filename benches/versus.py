@@ -25,43 +25,12 @@ The environment goes to `versus/` under the target folder: numpy, onnx, onnxrunt
 import argparse
 import json
 import os
-import platform
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-
-
-TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-
-TORCH_INDEX = "https://download.pytorch.org/whl/cpu"
-
-
-def own_environment(arguments):
-    """Runs this script again inside the virtual environment, which is made first if need be."""
-    venv = Path(arguments.venv)
-    python = venv / "bin" / "python3"
-    if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True)
-
-    def installed():
-        listed = subprocess.run([python, "-m", "pip", "list", "--format=json"], check=True, capture_output=True)
-        return {package["name"] for package in json.loads(listed.stdout)}
-
-    missing = [name for name in ("numpy", "onnx", "onnxruntime") if name not in installed()]
-    if missing:
-        print("installing", *missing, "into", venv, file=sys.stderr)
-        subprocess.run([python, "-m", "pip", "install", "-q", *missing], check=True)
-    if not arguments.no_torch and "torch" not in installed():
-        print("installing torch into", venv, file=sys.stderr)
-        pip = [python, "-m", "pip", "install", "-q", "torch"]
-        cpu_only = subprocess.run([*pip, "--index-url", TORCH_INDEX], capture_output=True)
-        if cpu_only.returncode != 0 and subprocess.run(pip).returncode != 0:
-            print("torch: no wheel could be installed; its figures are left out", file=sys.stderr)
-    os.environ["NTMU_VERSUS"] = "1"
-    os.execv(python, [str(python), *sys.argv])
+from environment import ROOT, TARGET, conditions, enter, write
 
 
 def parse():
@@ -368,37 +337,23 @@ def measure(group, threads, seconds, with_torch):
             contestant["seconds"] = min(contestant["seconds"], time.perf_counter() - start)
 
 
-def conditions(with_torch):
+def main():
+    arguments = parse()
+    with_torch = not arguments.no_torch
+    enter(arguments.venv, ["numpy", "onnx", "onnxruntime"], with_torch)
     import numpy
     import onnxruntime
 
-    cpuinfo = Path("/proc/cpuinfo")
-    keys = ("model name", "cpu family", "model\t")
-    lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
-    facts = [line.split(":")[1].strip() for line in lines if line.startswith(keys)]
-    cpu = " ".join(dict.fromkeys(facts)) or platform.processor()
-    versions = {"onnxruntime": onnxruntime.__version__, "numpy": numpy.__version__, "python": platform.python_version(),
-                "rustc": subprocess.run(["rustc", "--version"], capture_output=True, text=True).stdout.strip()}
-    if with_torch:
-        import torch
-
-        versions["torch"] = torch.__version__
-    return {"cpu": cpu, "cpus": os.cpu_count(), "system": f"{platform.system()} {platform.machine()}", "versions": versions,
-            "load_average": os.getloadavg(), "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())}
-
-
-def main():
-    arguments = parse()
-    if "NTMU_VERSUS" not in os.environ:
-        own_environment(arguments)
-    with_torch = not arguments.no_torch
+    modules = [numpy, onnxruntime]
     if with_torch:
         try:
-            import torch  # noqa: F401
+            import torch
+
+            modules.append(torch)
         except ImportError:
             print("torch is not there; its figures are left out", file=sys.stderr)
             with_torch = False
-    before = conditions(with_torch)
+    before = conditions(modules)
     folder = TARGET / "versus" / "networks"
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*"):
@@ -430,10 +385,7 @@ def main():
     engine = [{"group": g, "name": n, "parameter": p, **found} for (g, n, p), found in sorted(ours.items())]
     results = {"conditions": {**before, "load_average_after": os.getloadavg()}, "peak_macs_per_second": peaks,
                "ratios": ratios(figures), "figures": figures, "engine": engine}
-    path = Path(arguments.json)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(results, indent=1) + "\n")
-    print(f"written to {path}", file=sys.stderr)
+    write(arguments.json, results)
 
 
 def cases(figures):

@@ -28,10 +28,13 @@ pub use ntmu_shaders as shaders;
 pub use ntmu_trainer as trainer;
 
 pub mod access;
+pub mod analysis;
 pub mod beside;
 pub mod brick_wall;
 pub mod built_in;
+pub mod curve;
 pub mod decoded;
+mod drawing;
 pub mod metrics;
 pub mod precision;
 pub mod quality;

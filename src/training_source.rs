@@ -32,6 +32,7 @@ pub fn training_source(set: &TextureSet) -> Source {
         mips: set.texels.clone(),
         outputs,
         maps,
+        mask: None,
     }
 }
 

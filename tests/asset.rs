@@ -1,16 +1,19 @@
 //! Assets and programs return from their bytes and texts, and nothing else is taken for one.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use ntmu::conformance::suite::container::Container;
 use ntmu::conformance::synthetic;
 use ntmu::isa::instruction::Instruction;
 use ntmu::isa::layout::Layout;
+use ntmu::isa::pyramid::Pyramid;
 use ntmu::isa::{Asset, Program, assembly};
 use ntmu::model::Request;
 use ntmu::model::exec::Decoder;
 use proptest::prelude::*;
 
-fn small(seed: u64) -> Asset {
+fn with_pyramid(seed: u64, pyramid: Pyramid) -> Asset {
     let mut spec = synthetic::Spec::small(16, 8);
+    spec.shape.pyramid = pyramid;
     spec.activation = synthetic::SpecActivation::Leaky(3);
     synthetic::asset(&spec, seed).unwrap()
 }
@@ -53,11 +56,76 @@ proptest! {
         file.extend(bytes);
         prop_assert!(Asset::from_bytes(&file).is_err());
     }
+
+    /// A file whose CRC-32 are right may hold anything.
+    #[test]
+    fn a_sealed_file_with_any_shape_is_an_asset_that_decodes_or_an_error(
+        changes in proptest::collection::vec((0_usize..32, any::<u8>()), 1..4),
+        minor in 0_u16..3,
+        code: u8,
+    ) {
+        let pyramid = Pyramid::from_code(code).unwrap_or(Pyramid::SINGLE);
+        let file = with_pyramid(3, pyramid).to_bytes();
+        let mut container = Container::parse(&file).unwrap();
+        container.version.1 = minor;
+        for (at, byte) in changes {
+            container = container.with("SHAP", at, &[byte]);
+        }
+        if let Ok(asset) = Asset::from_bytes(&container.to_bytes()) {
+            prop_assert_eq!(Asset::from_bytes(&asset.to_bytes()).unwrap(), asset.clone());
+            let program = Program::compile(&asset, Layout::TILED);
+            let decoder = Decoder::new(&asset, &program);
+            for mip in 0..asset.shape.mip_count {
+                let request = Request::new(&asset.shape, 0, 0, mip).unwrap();
+                prop_assert_eq!(decoder.texel(request, &mut ()).len(), asset.shape.outputs.len());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_file_has_the_smallest_version_that_holds_it_and_an_older_one_has_no_pyramid() {
+    for code in 0..=255 {
+        let Some(pyramid) = Pyramid::from_code(code) else {
+            continue;
+        };
+        let asset = with_pyramid(1, pyramid);
+        let minor = u16::from(pyramid != Pyramid::SINGLE);
+        let mut container = Container::parse(&asset.to_bytes()).unwrap();
+        assert_eq!(container.version, (2, minor));
+        container.version.1 = 1;
+        assert_eq!(Asset::from_bytes(&container.to_bytes()), Ok(asset.clone()));
+        container.version.1 = 0;
+        let older = Asset::from_bytes(&container.to_bytes());
+        if pyramid == Pyramid::SINGLE {
+            assert_eq!(older, Ok(asset));
+        } else {
+            let error = older.unwrap_err().to_string();
+            let expected = [
+                "shape.pyramid".to_owned(),
+                format!("{code}"),
+                "0 in a file of version 2.0".to_owned(),
+            ];
+            assert!(expected.iter().all(|part| error.contains(part)), "{error}");
+        }
+    }
+}
+
+#[test]
+fn every_code_that_is_no_pyramid_is_refused_with_what_is_one() {
+    let file = with_pyramid(1, Pyramid::EVERY_MIP).to_bytes();
+    let container = Container::parse(&file).unwrap();
+    for code in (0..=255).filter(|&code| Pyramid::from_code(code).is_none()) {
+        let file = container.with("SHAP", 15, &[code]).to_bytes();
+        let error = Asset::from_bytes(&file).unwrap_err().to_string();
+        assert!(error.contains("shape.pyramid") && error.contains(&code.to_string()));
+        assert!(error.contains("1 ≤ each ≤ first"), "{error}");
+    }
 }
 
 #[test]
 fn every_truncation_is_refused() {
-    let bytes = small(1).to_bytes();
+    let bytes = with_pyramid(1, Pyramid::EVERY_MIP).to_bytes();
     for length in 0..bytes.len() {
         assert!(
             Asset::from_bytes(&bytes[..length]).is_err(),
@@ -70,7 +138,12 @@ fn every_truncation_is_refused() {
 
 #[test]
 fn every_flipped_bit_is_refused() {
-    let mut bytes = small(2).to_bytes();
+    for pyramid in [Pyramid::SINGLE, Pyramid::EVERY_MIP] {
+        assert_every_flip_refused(with_pyramid(2, pyramid).to_bytes());
+    }
+}
+
+fn assert_every_flip_refused(mut bytes: Vec<u8>) {
     for bit in 0..8 * bytes.len() {
         bytes[bit / 8] ^= 1 << (bit % 8);
         assert!(Asset::from_bytes(&bytes).is_err(), "bit {bit}");
@@ -81,7 +154,7 @@ fn every_flipped_bit_is_refused() {
 
 #[test]
 fn a_program_that_does_not_fit_is_refused_at_its_place() {
-    let asset = small(3);
+    let asset = with_pyramid(3, Pyramid::SINGLE);
     let good = Program::compile(&asset, Layout::LINEAR)
         .instructions()
         .to_vec();

@@ -13,7 +13,7 @@ use ntmu::isa::sampler::{Detail, SampleRequest, Sampler};
 use ntmu::isa::{Asset, Program, image};
 use ntmu::model::Request;
 use ntmu::model::exec::Decoder;
-use ntmu::trainer::{self, Precision, Preset, Steps, TrainConfig, TrainingDevice};
+use ntmu::trainer::{self, Precision, Preset, TrainConfig, TrainingDevice};
 use std::sync::atomic::AtomicBool;
 
 fn trained(preset: &Preset, precision: Precision) -> Asset {
@@ -25,11 +25,7 @@ fn trained(preset: &Preset, precision: Precision) -> Asset {
 
 fn trained_as(config: &TrainConfig) -> Asset {
     let config = TrainConfig {
-        steps: Some(Steps {
-            encoder: 0,
-            refine: 4,
-            integer: 2,
-        }),
+        plan: Some(TrainConfig::default().usual_plan([0, 4, 2])),
         batch: 768,
         ..config.clone()
     };

@@ -3,10 +3,11 @@
 #![cfg(feature = "train")]
 
 mod support;
+mod training;
 
 use ntmu::decoded::Decoded;
 use ntmu::quality::{Quality, maps_of};
-use ntmu::trainer::{self, Precision, Preset, Steps, TrainConfig, TrainReport, TrainingDevice};
+use ntmu::trainer::{self, Precision, Preset, TrainConfig, TrainReport, TrainingDevice};
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
@@ -81,11 +82,7 @@ fn halves_exported_from_reals_decode_like_the_reals() {
     for name in ["hw-16", "rtxntc", "tsnc"] {
         let (model, report) = decoded(&TrainConfig {
             precision: Precision::Fp16,
-            steps: Some(Steps {
-                encoder: 0,
-                refine: 200,
-                integer: 0,
-            }),
+            plan: Some(TrainConfig::default().usual_plan([0, 200, 0])),
             ..preset(name)
         });
         let float = report.psnr_float;
@@ -112,11 +109,19 @@ fn an_interrupted_run_goes_on_to_the_same_bytes() {
         .output()
         .unwrap();
     assert!(generated.status.success());
-    let config = "checkpoint_every = 50\nsteps = { encoder = 0, refine = 3000, integer = 1000 }\n";
-    std::fs::write(folder.path().join("run.toml"), config).unwrap();
+    std::fs::write(folder.path().join("run.toml"), "checkpoint_every = 50\n").unwrap();
     let encode = |output| {
         [
-            "encode", "set", "-o", output, "--preset", "hw-16", "--config", "run.toml",
+            "encode",
+            "set",
+            "-o",
+            output,
+            "--preset",
+            "hw-16",
+            "--config",
+            "run.toml",
+            "--steps",
+            "0+3000+1000",
         ]
     };
 

@@ -178,12 +178,13 @@ impl<'a> Claims<'a> {
 
     /// Positions and corners, which are exact.
     fn grids(&self, taps: &Taps) -> BTreeMap<Stage, Distance> {
-        use crate::oracle::position::RealAxis;
+        use crate::oracle::position::{RealAxis, RealLevel};
         let shape = &self.oracle.asset().shape;
         let mut stages = BTreeMap::new();
         for (grid, tap) in taps.grids.iter().enumerate() {
-            let scale = shape.grids[grid].scale_log2;
-            let (width, height) = shape.grid_size(grid);
+            let level = RealLevel::of(shape.pyramid, taps.request.mip());
+            let scale = level.scale_log2(shape, grid);
+            let [width, height] = level.cells(shape, grid);
             let (mut model, mut real) = (Vec::new(), Vec::new());
             let (mut cells, mut real_cells) = (Vec::new(), Vec::new());
             let request = taps.request;

@@ -49,6 +49,8 @@ flags! {
         "Nothing special: a device that fails here fails everywhere.";
     DEEP_MIP = "DeepMip", "position",
         "A mip coarser than the grid: corners are a stride of several cells apart.";
+    COARSE_LEVEL = "CoarseLevel", "position",
+        "A level of the grids beyond level 0 serves the mip: it has a size and latents of its own.";
     DROPPED_FRACTION = "DroppedFraction", "position",
         "The position has more than four fractional bits: the phase is floored, not rounded.";
     SNAP = "Snap", "position",

@@ -14,6 +14,7 @@ use ntmu_isa::filter::FilterRule;
 use ntmu_isa::half::{Half, SumOrder};
 use ntmu_isa::layer::Parameters;
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::rescale::Requantizer;
 use ntmu_isa::round::Rounding;
 use ntmu_isa::shape::OutputFormat;
@@ -213,6 +214,19 @@ const MUTANTS: &[(&str, &str, Change)] = &[
             {
                 p.table.rotate_left(1);
             }
+        }
+    }),
+    ("level 0 for every mip", "position", |p| {
+        for grid in [0, 1] {
+            let latents = p.shape.level_latents(grid, 0) as usize;
+            p.grids[grid].truncate(latents);
+        }
+        p.shape.pyramid = Pyramid::SINGLE;
+    }),
+    ("level 0 behind the others", "codes", |p| {
+        for grid in [0, 1] {
+            let latents = p.shape.level_latents(grid, 0) as usize;
+            p.grids[grid].rotate_left(latents);
         }
     }),
     ("fp16 channels as bytes", "channels", |p| {

@@ -164,7 +164,7 @@ impl Device for Door {
 #[test]
 fn a_device_that_accepts_everything_or_nothing_fails() {
     let suites = [suite::refuse::suite().unwrap()];
-    let controls = 3;
+    let controls = 6;
     let open = against(&suites, &mut Door(true)).totals();
     let shut = against(&suites, &mut Door(false)).totals();
     assert_eq!((open.0, shut.1), (controls, controls));

@@ -175,6 +175,14 @@ fn six_hundred_seeds_cover_every_choice() {
             "scale",
         );
     }
+    // A single level, and every pyramid that the longest of these chains can show.
+    all(
+        names(&|s| format!("{:?}", s.shape.pyramid)),
+        1 + 21,
+        "pyramid",
+    );
+    let levels = |s: &Spec| s.shape.level_count().to_string();
+    all(names(&levels), 7, "levels");
     all(names(&|s| s.blocks.to_string()), 4, "blocks");
     all(names(&|s| s.block_span.to_string()), 3, "span");
     all(names(&|s| s.hidden.len().to_string()), 4, "hidden layers");

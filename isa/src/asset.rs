@@ -89,7 +89,7 @@ pub struct Parts {
     pub shape: Shape,
     /// Implementation-defined choices.
     pub profile: Profile,
-    /// Codes of each grid: rows of cells, cells of channels.
+    /// Codes of each grid: levels of rows of cells, cells of channels.
     pub grids: [Vec<u8>; 2],
     /// The synthesizer, first layer first.
     pub layers: Vec<Layer>,
@@ -133,12 +133,14 @@ impl Asset {
         self.parts
     }
 
-    /// The codes of one cell of a grid, one for each channel.
+    /// The codes of one cell of a level of a grid, one for each channel. Mip `m` reads those of level
+    /// `pyramid.level_of(m)`.
     #[must_use]
-    pub fn cell(&self, grid: usize, x: u32, y: u32) -> &[u8] {
-        let (width, _) = self.shape.grid_size(grid);
+    pub fn cell(&self, grid: usize, level: u8, x: u32, y: u32) -> &[u8] {
+        let (width, _) = self.shape.level_size(grid, level);
         let channels = usize::from(self.shape.grids[grid].channels);
-        let start = (y as usize * width as usize + x as usize) * channels;
+        let base = self.shape.level_base(grid, level) as usize;
+        let start = base + (y as usize * width as usize + x as usize) * channels;
         &self.grids[grid][start..start + channels]
     }
 

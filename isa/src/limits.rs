@@ -2,6 +2,10 @@
 
 /// Texels along one axis of mip 0.
 pub const MAX_SIZE: u32 = 16_384;
+/// Mips of the longest chain, that of [`MAX_SIZE`] texels.
+pub const MAX_MIPS: u8 = 15;
+/// Levels of a grid, of which none serves fewer than one mip.
+pub const MAX_LEVELS: u8 = MAX_MIPS;
 /// Channels of a texture set.
 pub const MAX_CHANNELS: u16 = 16;
 /// Channels of one grid.

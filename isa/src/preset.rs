@@ -108,6 +108,11 @@ impl Preset {
     /// Bits of an input of the synthesizer.
     pub const INPUT_BITS: u8 = 8;
 
+    /// The same with this pyramid.
+    const fn with_pyramid(self, pyramid: Pyramid) -> Preset {
+        Preset { pyramid, ..self }
+    }
+
     /// The same with both grids interpolated, these waves and this padding.
     const fn interpolated(mut self, octaves: u8, wave: Wave, padding: u8) -> Preset {
         self.grids[0].sampling = Sampling::Interpolated;
@@ -123,9 +128,8 @@ impl Preset {
     ///
     /// Grids are (channels, bits, log2 of the scale). The CNTC shapes are a reading of the
     /// paper's rates, which fits them all: grids (N/2, N), widths 64, 128, 128, four residual
-    /// blocks of two square layers. The NTC shapes have the grids of the NTC paper's mip 0 and
-    /// its three hidden layers of 64, but not its feature pyramid: coarse mips stride through the
-    /// one pair of grids, so their rate is 15/16 of the original's. `rtxntc` has the synthesizer of
+    /// blocks of two square layers. The NTC shapes have the grids of the NTC paper's mip 0, its
+    /// feature pyramid and its three hidden layers of 64. `rtxntc` has the synthesizer of
     /// the RTX SDK, 48-64-48-32, with its clamped hard GELU and its saw waves: two grids of 16
     /// interpolated features, one at half the other's resolution as two mips of its latents are,
     /// in the SDK's shape of 5 bits per texel; 12 waves, the level (once, in the SDK twice) and
@@ -207,36 +211,40 @@ impl Preset {
         .interpolated(3, Wave::Saw, 3),
         preset(
             "ntc-0.2",
-            "the NTC paper's lowest rate, without its pyramid",
+            "the NTC paper's lowest rate",
             [(8, 2, 2), (12, 4, 3)],
             &[64, 64, 64],
             0,
             GELU,
-        ),
+        )
+        .with_pyramid(Pyramid::NTC),
         preset(
             "ntc-0.5",
-            "the NTC paper's second rate, without its pyramid",
+            "the NTC paper's second rate",
             [(12, 4, 2), (20, 4, 3)],
             &[64, 64, 64],
             0,
             GELU,
-        ),
+        )
+        .with_pyramid(Pyramid::NTC),
         preset(
             "ntc-1.0",
-            "the NTC paper's third rate, without its pyramid",
+            "the NTC paper's third rate",
             [(12, 2, 1), (10, 4, 2)],
             &[64, 64, 64],
             0,
             GELU,
-        ),
+        )
+        .with_pyramid(Pyramid::NTC),
         preset(
             "ntc-2.25",
-            "the NTC paper's highest rate, without its pyramid",
+            "the NTC paper's highest rate",
             [(16, 4, 1), (12, 4, 2)],
             &[64, 64, 64],
             0,
             GELU,
-        ),
+        )
+        .with_pyramid(Pyramid::NTC),
         preset(
             "tsnc",
             "the synthesizer of Intel's SDK",
@@ -380,5 +388,17 @@ mod tests {
         }
         assert_eq!(named("rtxntc").macs(16), 8192);
         assert_eq!(named("tsnc").macs(16), 6144);
+    }
+
+    #[test]
+    fn a_pyramid_is_where_the_peer_has_one() {
+        for preset in Preset::ALL {
+            let expected = if preset.name.starts_with("ntc-") {
+                Pyramid::NTC
+            } else {
+                Pyramid::SINGLE
+            };
+            assert_eq!(preset.pyramid, expected, "{}", preset.name);
+        }
     }
 }

@@ -111,7 +111,11 @@ mod tests {
             for mip in 0..32 {
                 let level = pyramid.level_of(mip);
                 let served = (0..64).filter(|&m| pyramid.level_of(m) == level).count();
-                let expected = if level == 0 { pyramid.first } else { pyramid.each };
+                let expected = if level == 0 {
+                    pyramid.first
+                } else {
+                    pyramid.each
+                };
                 assert_eq!(served, usize::from(expected), "{pyramid:?} mip {mip}");
                 // Each halving of the level undoes one of the mip.
                 assert!(pyramid.mip_in_level(mip) < pyramid.first);

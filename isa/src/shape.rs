@@ -220,7 +220,9 @@ impl Shape {
     /// Latents of a grid before those of a level: levels follow each other, level 0 first.
     #[must_use]
     pub fn level_base(&self, grid: usize, level: u8) -> u64 {
-        (0..level).map(|level| self.level_latents(grid, level)).sum()
+        (0..level)
+            .map(|level| self.level_latents(grid, level))
+            .sum()
     }
 
     /// Latents of all levels of a grid.

@@ -47,22 +47,42 @@ fn codes(shape: &Shape, grid: usize) -> Vec<u8> {
         .collect()
 }
 
+/// The same shape with its whole chain and this pyramid.
+fn with_pyramid(shape: Shape, pyramid: Pyramid) -> Shape {
+    Shape {
+        mip_count: Shape::max_mip_count(shape.width, shape.height),
+        pyramid,
+        ..shape
+    }
+}
+
+/// Every cell of a grid as (level, x, y).
+fn cells(shape: &Shape, grid: usize) -> Vec<(u8, u32, u32)> {
+    let levels = 0..shape.level_count();
+    let of = |level| {
+        let (width, height) = shape.level_size(grid, level);
+        rows(width, height)
+            .into_iter()
+            .map(move |(x, y)| (level, x, y))
+    };
+    levels.flat_map(of).collect()
+}
+
 /// Every code has bits of its own within the bytes that its cell is said to touch, and returns from
 /// the image.
 fn assert_lossless(layout: Layout, shape: &Shape) {
     let total = layout.total_bytes(shape);
     let mut taken = vec![0_u8; total as usize];
     for grid in 0..2 {
-        let (width, height) = shape.grid_size(grid);
         let bits = u64::from(shape.grids[grid].format.bits());
         let planes = u64::from(layout.planes(shape, grid));
         let cell_bytes = layout.cell_bytes(shape, grid);
-        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-            let address = layout.address(shape, grid, x, y);
+        for (level, x, y) in cells(shape, grid) {
+            let address = layout.address(shape, grid, level, x, y);
             for channel in 0..usize::from(shape.grids[grid].channels) {
-                let first = layout.first_bit(shape, grid, x, y, channel);
+                let first = layout.first_bit(shape, grid, level, x, y, channel);
                 let plane = if planes == 1 { 0 } else { channel as u64 };
-                let start = address + plane * layout.plane_bytes(shape, grid);
+                let start = address + plane * layout.plane_bytes(shape, grid, level);
                 assert!(start + cell_bytes <= total, "{layout}");
                 for bit in first..first + bits {
                     let byte = bit / 8;
@@ -114,8 +134,50 @@ proptest! {
         width in 1_u32..300,
         height in 1_u32..300,
         grids in [(1_u16..6, 1_u8..=8, 1_u8..=3), (1_u16..6, 1_u8..=8, 1_u8..=3)],
+        pyramid in prop::sample::select((0..=255).filter_map(Pyramid::from_code).collect::<Vec<_>>()),
     ) {
-        assert_lossless(layout, &shape(width, height, grids));
+        let shape = with_pyramid(shape(width, height, grids), pyramid);
+        assert_lossless(layout, &shape);
+    }
+}
+
+#[test]
+fn every_pyramid_in_every_layout_returns_from_memory() {
+    for layout in Layout::every() {
+        for pyramid in (0..=255).filter_map(Pyramid::from_code) {
+            let sizes = shape(37, 70, [(3, 3, 1), (2, 5, 2)]);
+            assert_lossless(layout, &with_pyramid(sizes, pyramid));
+        }
+    }
+}
+
+#[test]
+fn levels_start_at_lines_of_their_own_and_level_0_where_a_single_level_does() {
+    let single = shape(300, 140, [(5, 3, 2), (12, 4, 2)]);
+    let several = with_pyramid(single.clone(), Pyramid::NTC);
+    assert_eq!(several.level_count(), 4);
+    for layout in Layout::every() {
+        let mut starts = Vec::new();
+        for (grid, level) in [0, 1].into_iter().flat_map(|g| (0..4).map(move |l| (g, l))) {
+            let base = layout.base(&several, grid, level);
+            starts.push(base);
+            // In a record the part of grid 1 comes after that of grid 0.
+            let within = match layout.storage {
+                Storage::Interleaved | Storage::Planar => 0,
+                Storage::Together => base - layout.base(&several, 0, level),
+            };
+            assert_eq!((base - within) % BASE_ALIGNMENT, 0, "{layout}");
+            if (grid, level) == (0, 0) {
+                assert_eq!(base, layout.base(&single, 0, 0));
+                let bytes = layout.level_bytes(&several, 0, 0);
+                assert_eq!(bytes, layout.level_bytes(&single, 0, 0));
+            }
+            assert!(
+                base + layout.level_bytes(&several, grid, level) <= layout.total_bytes(&several)
+            );
+        }
+        let distinct: BTreeSet<u64> = starts.iter().copied().collect();
+        assert_eq!(distinct.len(), starts.len(), "{layout}");
     }
 }
 
@@ -224,12 +286,12 @@ fn no_two_named_layouts_put_the_same_codes_in_the_same_places() {
 fn tiles_of_four_lie_where_they_always_did() {
     let shape = shape(100, 52, [(5, 3, 3), (12, 4, 3)]);
     // 13×7 cells become 4×2 tiles of 16 cells of 2 bytes, then to a multiple of 256.
-    assert_eq!(Layout::TILED.base(&shape, 1), 256);
+    assert_eq!(Layout::TILED.base(&shape, 1, 0), 256);
     assert_eq!(Layout::TILED.total_bytes(&shape), 256 + 4 * 2 * 16 * 6);
     // Tile (2, 1) is the seventh; cell (1, 2) in it the tenth.
-    assert_eq!(Layout::TILED.address(&shape, 0, 9, 6), (6 * 16 + 9) * 2);
+    assert_eq!(Layout::TILED.address(&shape, 0, 0, 9, 6), (6 * 16 + 9) * 2);
     assert_eq!(
-        Layout::LINEAR.address(&shape, 1, 9, 6),
+        Layout::LINEAR.address(&shape, 1, 0, 9, 6),
         256 + (6 * 13 + 9) * 6
     );
 }
@@ -315,7 +377,7 @@ fn a_record_holds_the_cell_of_grid_0_and_then_that_of_grid_1() {
             continue;
         }
         for (x, y) in rows(13, 7) {
-            let [first, second] = [0, 1].map(|grid| layout.address(&shape, grid, x, y));
+            let [first, second] = [0, 1].map(|grid| layout.address(&shape, grid, 0, x, y));
             assert_eq!(second, first + layout.cell_bytes(&shape, 0));
             assert_eq!(first % 8, 0, "records of 2 and 6 bytes");
         }
@@ -332,13 +394,13 @@ fn planes_start_at_lines_and_no_code_straddles_bytes() {
     {
         let shape = shape(100, 52, [(5, bits, 3), (12, bits, 2)]);
         for (grid, channels) in [(0, 5), (1, 12)] {
-            assert_eq!(layout.base(&shape, grid) % BASE_ALIGNMENT, 0);
-            assert_eq!(layout.plane_bytes(&shape, grid) % BASE_ALIGNMENT, 0);
+            assert_eq!(layout.base(&shape, grid, 0) % BASE_ALIGNMENT, 0);
+            assert_eq!(layout.plane_bytes(&shape, grid, 0) % BASE_ALIGNMENT, 0);
             assert_eq!(layout.planes(&shape, grid), channels);
             assert_eq!(layout.cell_bytes(&shape, grid), 1);
             let (width, height) = shape.grid_size(grid);
             for (x, y) in rows(width, height) {
-                let first = layout.first_bit(&shape, grid, x, y, 4);
+                let first = layout.first_bit(&shape, grid, 0, x, y, 4);
                 assert!(first % 8 + u64::from(bits) <= 8, "{layout}");
             }
         }

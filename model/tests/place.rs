@@ -12,6 +12,7 @@ use ntmu_isa::layer::Layer;
 use ntmu_isa::layout::Layout;
 use ntmu_isa::position::{AddressMode, AxisPosition, CornerSnap};
 use ntmu_isa::profile::Profile;
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::shape::{OutputFormat, Sampling, Shape};
 use ntmu_isa::{Asset, Program};
 use ntmu_model::exec::{Corners, Decoder, Probe};
@@ -20,7 +21,19 @@ use ntmu_model::{Place, PlaceError, Request};
 /// A set of 64×32 texels and 7 mips, whose grids are as large and half as large in every direction as
 /// `scales` say, with random latents and one layer that depends on every input.
 fn textured(scales: [u8; 2], mode: AddressMode, snap: CornerSnap, profile: Profile) -> Asset {
+    pyramid_of(Pyramid::SINGLE, scales, mode, snap, profile)
+}
+
+/// The same with a pyramid.
+fn pyramid_of(
+    pyramid: Pyramid,
+    scales: [u8; 2],
+    mode: AddressMode,
+    snap: CornerSnap,
+    profile: Profile,
+) -> Asset {
     let mut shape = shape(4, 12, &[OutputFormat::Unorm16; 3]);
+    shape.pyramid = pyramid;
     (shape.width, shape.height, shape.mip_count) = (64, 32, 7);
     (shape.octaves, shape.snap, shape.address_mode) = (3, snap, mode);
     shape.grids[1].sampling = Sampling::Corners;
@@ -111,19 +124,24 @@ fn each_axis_of_a_place_is_its_position_in_each_grid() {
         .into_iter()
         .flat_map(|mode| CornerSnap::ALL.map(|snap| (mode, snap)))
     {
-        let asset = textured([3, 1], mode, snap, Profile::NORMATIVE);
+        // Mips 0 and 1, 2 and 3, and so on; each pair lies in its level as mips 0 and 1 in level 0.
+        let pyramid = Pyramid::new(2, 2).unwrap();
+        let asset = pyramid_of(pyramid, [3, 1], mode, snap, Profile::NORMATIVE);
         let program = Program::compile(&asset, Layout::LINEAR);
         let decoder = Decoder::new(&asset, &program);
         let mut random = Random(5);
         for _ in 0..500 {
             let mip = random.below(7) as u8;
+            let level = mip / 2;
             let (x, y) = (random.signed(13).into(), random.signed(13).into());
             let found = inputs(&decoder, &at(&asset.shape, x, y, 6, mip)).corners;
             for (grid, found) in found.iter().enumerate() {
                 let scale = asset.shape.grids[grid].scale_log2;
-                let axis = |coordinate| AxisPosition::at(coordinate, 6, mip, scale, snap, 8);
-                let (columns, rows) = asset.shape.grid_size(grid);
+                let axis = |coordinate| AxisPosition::at(coordinate, 6, mip % 2, scale, snap, 8);
+                let cells = |texels: u32| texels.div_ceil(1 << (scale + 2 * level));
+                let (columns, rows) = (cells(64), cells(32));
                 let expected = Corners {
+                    level,
                     x: axis(x),
                     y: axis(y),
                     columns: axis(x).corners(columns, mode),
@@ -387,7 +405,7 @@ fn the_trace_of_texels_is_that_of_their_centres_and_places_touch_their_own_cells
     let corners = inputs(&decoder, &place).corners;
     for (fetch, corners) in trace.texel(0).iter().zip(corners) {
         let grid = usize::from(fetch.grid);
-        let address = |(x, y)| Layout::TILED.address(&asset.shape, grid, x, y);
+        let address = |(x, y)| Layout::TILED.address(&asset.shape, grid, 0, x, y);
         assert_eq!(fetch.addresses, corners.cells().map(address));
     }
 }

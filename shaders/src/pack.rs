@@ -7,7 +7,7 @@ use ntmu_isa::Asset;
 use ntmu_isa::activation::Activation;
 use ntmu_isa::layer::{Layer, Parameters};
 use ntmu_isa::layout::Layout;
-use ntmu_isa::limits::{MAX_CHANNELS, MAX_LAYERS};
+use ntmu_isa::limits::{MAX_CHANNELS, MAX_LAYERS, MAX_LEVELS};
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::LaneFormat;
 
@@ -168,8 +168,10 @@ fn lanes(format: LaneFormat) -> [u32; 3] {
 const LAYER_WORDS: usize = 24;
 /// Words of `Header` before its grids.
 const HEAD_WORDS: usize = 12;
+/// Words of `Grid` before its levels.
+const GRID_HEAD_WORDS: usize = 8;
 /// Words of `Grid`.
-const GRID_WORDS: usize = 8;
+const GRID_WORDS: usize = GRID_HEAD_WORDS + 4 * MAX_LEVELS as usize;
 
 /// Words of `Header`.
 pub(crate) const fn header_words() -> usize {
@@ -191,20 +193,27 @@ fn header(asset: &Asset, taps: &TapLayout) -> Vec<u32> {
         taps.words,
         u32::from(shape.wave.code()),
         u32::from(shape.padding),
-        0,
+        u32::from(shape.pyramid.code()),
     ];
     for (index, grid) in shape.grids.iter().enumerate() {
-        let (width, height) = shape.grid_size(index);
         words.extend([
-            width,
-            height,
             u32::from(grid.channels),
             u32::from(grid.format.bits()),
             u32::from(grid.scale_log2),
             Layout::LINEAR.cell_bytes(shape, index) as u32,
             taps.grids[index].start,
             0,
+            0,
+            0,
         ]);
+        let end = words.len() + 4 * usize::from(MAX_LEVELS);
+        let mut before = 0;
+        for level in 0..shape.level_count() {
+            let (width, height) = shape.level_size(index, level);
+            words.extend([width, height, before, 0]);
+            before += width * height;
+        }
+        words.resize(end, 0);
     }
     words.extend(shape.outputs.iter().map(|format| u32::from(format.code())));
     words.resize(HEAD_WORDS + 2 * GRID_WORDS + usize::from(MAX_CHANNELS), 0);
@@ -213,12 +222,12 @@ fn header(asset: &Asset, taps: &TapLayout) -> Vec<u32> {
 
 /// Bytes of a grid's packed codes, padded to a word.
 pub(crate) fn grid_bytes(asset: &Asset, grid: usize) -> u64 {
-    Layout::LINEAR
-        .grid_bytes(&asset.shape, grid)
-        .next_multiple_of(4)
+    let shape = &asset.shape;
+    let cells = shape.grid_latents(grid) / u64::from(shape.grids[grid].channels);
+    (cells * Layout::LINEAR.cell_bytes(shape, grid)).next_multiple_of(4)
 }
 
-/// The packed codes of a grid: cells row after row, each from its least significant bit and padded
+/// The packed codes of a grid: levels one after the other, of cells row after row, each from its least significant bit and padded
 /// to a byte.
 fn grid_codes(asset: &Asset, grid: usize) -> Vec<u8> {
     let shape = asset.shape.grids[grid];

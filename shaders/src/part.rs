@@ -132,8 +132,8 @@ mod tests {
     use ntmu_isa::latent::LatentFormat;
     use ntmu_isa::layer::{HalfParameters, Parameters};
     use ntmu_isa::position::{AddressMode, CornerSnap};
-use ntmu_isa::pyramid::Pyramid;
     use ntmu_isa::profile::Profile;
+    use ntmu_isa::pyramid::Pyramid;
     use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 
     /// fp16 layers of these widths on one texel.

@@ -48,6 +48,7 @@ pub const STAGES: &[Stage] = &[
             "axis_position",
             "address_resolve",
             "axis_corners",
+            "pyramid_level",
             "position"
         ]
     ),

@@ -10,7 +10,7 @@ use ntmu_isa::embed::{WAVES_PER_OCTAVE, Wave};
 use ntmu_isa::filter::FilterRule;
 use ntmu_isa::half::activation::SIXTH;
 use ntmu_isa::half::{Half, SumOrder};
-use ntmu_isa::limits::{MAX_CHANNELS, MAX_LAYERS};
+use ntmu_isa::limits::{MAX_CHANNELS, MAX_LAYERS, MAX_LEVELS};
 use ntmu_isa::position::{AddressMode, CornerSnap, PHASE_BITS};
 use ntmu_isa::rescale::{Multiplier, Requantizer};
 use ntmu_isa::round::Rounding;
@@ -44,6 +44,7 @@ pub fn generate() -> String {
     section(&mut text, "isa::limits");
     unsigned(&mut text, "MAX_CHANNELS", u32::from(MAX_CHANNELS));
     unsigned(&mut text, "MAX_LAYERS", u32::from(MAX_LAYERS));
+    unsigned(&mut text, "MAX_LEVELS", u32::from(MAX_LEVELS));
 
     section(&mut text, "isa::position");
     unsigned(&mut text, "PHASE_BITS", u32::from(PHASE_BITS));

@@ -12,6 +12,7 @@ use ntmu_isa::filter::FilterRule;
 use ntmu_isa::half::{Half, SumOrder};
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters};
 use ntmu_isa::profile::{NamedProfile, Profile};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{LaneFormat, OutputFormat, Sampling};
 use ntmu_isa::{Asset, limits};
@@ -77,6 +78,9 @@ fn the_small_assets_are_of_every_kind() {
         let (shape, profile) = (&asset.shape, &asset.profile);
         seen.insert(format!("interpolate {}", profile.interpolate.name()));
         seen.insert(format!("wave {}", shape.wave.name()));
+        let is_single = shape.pyramid == Pyramid::SINGLE;
+        let levels = shape.level_count().min(3);
+        seen.insert(format!("single {is_single}, levels {levels}"));
         for grid in [0, 1] {
             seen.insert(format!("grid {grid} {}", shape.grids[grid].sampling.name()));
         }
@@ -138,6 +142,8 @@ fn the_small_assets_are_of_every_kind() {
         "to float16",
     ]));
     wanted.extend(["integer table", "quantize", "wave triangle", "wave saw"].map(str::to_owned));
+    wanted.push("single true, levels 1".to_owned());
+    wanted.extend((1..=3).map(|levels| format!("single false, levels {levels}")));
     wanted.extend(FilterRule::ALL.map(|rule| format!("interpolate {}", rule.name())));
     for input in ["bytes", "words"] {
         wanted.extend(Overflow::ALL.map(|o| format!("integer of {input} {}", o.name())));

@@ -9,14 +9,15 @@ struct Request {
 
 // Grid 0 or 1 of the asset.
 struct Grid {
-    width: u32, // cells
-    height: u32, // cells
     channels: u32,
     bits: u32, // of a latent
-    scale_log2: u32,
+    scale_log2: u32, // of level 0
     cell_bytes: u32,
     tap: u32, // where its taps start
-    reserved: u32,
+    reserved: u32, // these, up to a multiple of sixteen bytes
+    reserved_too: u32,
+    reserved_last: u32,
+    levels: array<vec4<u32>, MAX_LEVELS>, // columns, rows, cells of the levels before; nothing
 }
 
 // One layer. Its input is vector `index`, its output vector `index + 1`.
@@ -59,7 +60,7 @@ struct Header {
     tap_words: u32, // words of one texel's taps
     wave: u32,
     padding: u32,
-    reserved: u32,
+    pyramid: u32, // mips of level 0 << 4 | mips of every further level; 0: a single level
     grids: array<Grid, 2>,
     outputs: array<vec4<u32>, MAX_CHANNELS / 4u>, // output format codes
     layers: array<Layer, MAX_LAYERS>,
@@ -83,7 +84,8 @@ struct Part {
 
 @group(0) @binding(0) var<uniform> header: Header;
 @group(0) @binding(1) var<storage, read> requests: array<Request>;
-// Cells row after row, each with its channels' codes from the least significant bit, padded to a byte.
+// Levels one after the other, of cells row after row, each with its channels' codes from the least
+// significant bit, padded to a byte.
 @group(0) @binding(2) var<storage, read> grid0: array<u32>;
 @group(0) @binding(3) var<storage, read> grid1: array<u32>;
 @group(0) @binding(4) var<storage, read> rows: array<Row>;

@@ -1,9 +1,9 @@
-// Fetch: the code of one channel of one cell. See isa/src/layout/, `Layout::LINEAR`.
+// Fetch: the code of one channel of one cell, of levels that are linear and follow each other.
 
 // The byte addresses of the four corners (0,0), (1,0), (0,1), (1,1) within their grid.
 fn corner_addresses(grid: u32, corners: Corners) -> vec4<u32> {
-    let width = header.grids[grid].width;
-    let cells = vec4<u32>(
+    let width = corners.level.x;
+    let cells = corners.level.z + vec4<u32>(
         corners.rows.x * width + corners.columns.x,
         corners.rows.x * width + corners.columns.y,
         corners.rows.y * width + corners.columns.x,

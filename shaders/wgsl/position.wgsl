@@ -1,4 +1,4 @@
-// Grid position: which cells surround a texel of a mip. See isa/src/position.rs.
+// Grid position: which cells of which level surround a texel of a mip. See isa/src/position.rs.
 
 struct AxisPosition {
     first: i32, // cells; may lie outside the grid
@@ -7,6 +7,7 @@ struct AxisPosition {
 }
 
 struct Corners {
+    level: vec4<u32>, // of the grid, as `Grid` has it
     x: AxisPosition,
     y: AxisPosition,
     columns: vec2<u32>,
@@ -54,21 +55,36 @@ fn axis_corners(axis: AxisPosition, size: u32, mode: u32) -> vec2<u32> {
     return vec2<u32>(address_resolve(mode, axis.first, size), address_resolve(mode, second, size));
 }
 
+// The level of the grids that serves a mip, and the mip that lies in level 0 as this one lies in its
+// level: each level halves the grid as many times as it serves mips. See isa/src/pyramid.rs.
+fn pyramid_level(pyramid: u32, mip: u32) -> vec2<u32> {
+    let first = pyramid >> 4u;
+    let each = pyramid & 15u;
+    if (each == 0u || mip < first) {
+        return vec2<u32>(0u, mip);
+    }
+    let beyond = mip - first;
+    return vec2<u32>(beyond / each + 1u, first - each + beyond % each);
+}
+
 fn position(grid: u32, request: Request) -> Corners {
-    let shape = header.grids[grid];
-    let x = axis_position(request.x, request.mip, shape.scale_log2, header.snap);
-    let y = axis_position(request.y, request.mip, shape.scale_log2, header.snap);
-    let columns = axis_corners(x, shape.width, header.address_mode);
-    let rows = axis_corners(y, shape.height, header.address_mode);
-    tap(shape.tap, x.first);
-    tap(shape.tap + 1u, bitcast<i32>(x.stride));
-    tap(shape.tap + 2u, bitcast<i32>(x.phase));
-    tap(shape.tap + 3u, y.first);
-    tap(shape.tap + 4u, bitcast<i32>(y.stride));
-    tap(shape.tap + 5u, bitcast<i32>(y.phase));
-    tap(shape.tap + 6u, bitcast<i32>(columns.x));
-    tap(shape.tap + 7u, bitcast<i32>(columns.y));
-    tap(shape.tap + 8u, bitcast<i32>(rows.x));
-    tap(shape.tap + 9u, bitcast<i32>(rows.y));
-    return Corners(x, y, columns, rows);
+    let served = pyramid_level(header.pyramid, request.mip);
+    let level = header.grids[grid].levels[served.x];
+    let scale_log2 = header.grids[grid].scale_log2;
+    let first_tap = header.grids[grid].tap;
+    let x = axis_position(request.x, served.y, scale_log2, header.snap);
+    let y = axis_position(request.y, served.y, scale_log2, header.snap);
+    let columns = axis_corners(x, level.x, header.address_mode);
+    let rows = axis_corners(y, level.y, header.address_mode);
+    tap(first_tap, x.first);
+    tap(first_tap + 1u, bitcast<i32>(x.stride));
+    tap(first_tap + 2u, bitcast<i32>(x.phase));
+    tap(first_tap + 3u, y.first);
+    tap(first_tap + 4u, bitcast<i32>(y.stride));
+    tap(first_tap + 5u, bitcast<i32>(y.phase));
+    tap(first_tap + 6u, bitcast<i32>(columns.x));
+    tap(first_tap + 7u, bitcast<i32>(columns.y));
+    tap(first_tap + 8u, bitcast<i32>(rows.x));
+    tap(first_tap + 9u, bitcast<i32>(rows.y));
+    return Corners(level, x, y, columns, rows);
 }

@@ -53,6 +53,20 @@ fn probe_position(
     answers[index] = vec4<i32>(axis.first, bitcast<i32>(axis.phase), corners.x, corners.y);
 }
 
+// pyramid, mip: the level, the mip in it.
+@compute @workgroup_size(WORKGROUP)
+fn probe_pyramid(
+    @builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+) {
+    let index = case_index(id, groups);
+    if (index >= arrayLength(&cases)) {
+        return;
+    }
+    let c = cases[index];
+    let served = bitcast<vec2<i32>>(pyramid_level(c.x, c.y));
+    answers[index] = vec4<i32>(served, 0, 0);
+}
+
 // fractions, bits, rule: the four weights.
 @compute @workgroup_size(WORKGROUP)
 fn probe_interpolate(

@@ -4,6 +4,7 @@
 // isa::limits
 const MAX_CHANNELS: u32 = 16u;
 const MAX_LAYERS: u32 = 64u;
+const MAX_LEVELS: u32 = 15u;
 
 // isa::position
 const PHASE_BITS: u32 = 4u;

@@ -4,13 +4,14 @@ use super::profile::ProfileChoice;
 use crate::Verdict;
 use crate::{console, files};
 use anyhow::Context as _;
-use ndarray::Array3;
+use ndarray::{Array2, Array3};
 use ntmu::decoded::Decoded;
 use ntmu::isa::Asset;
-use ntmu::quality::{self, Figures, Quality};
+use ntmu::metrics::{LEAST_SIDE, Mask};
+use ntmu::quality::{self, Figures, MapQuality, Quality};
 use ntmu::texture_set::TextureSet;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Compare {
@@ -21,6 +22,13 @@ pub(crate) struct Compare {
     /// Fail (exit code 1) when the overall PSNR is below this many dB.
     #[arg(long, value_name = "DB")]
     min_psnr: Option<f64>,
+    /// Print a row for each map and mip as Markdown: PSNR, SSIM, angles of normals, SSIMULACRA2 of
+    /// colours.
+    #[arg(long)]
+    markdown: bool,
+    /// Measure only where this grey image of mip 0's size is at least one half.
+    #[arg(long, value_name = "FILE")]
+    mask: Option<PathBuf>,
     #[command(flatten)]
     profile: ProfileChoice,
 }
@@ -73,6 +81,10 @@ pub(crate) fn source_of(asset: &Asset, set: &TextureSet) -> anyhow::Result<Vec<A
 
 impl Compare {
     pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
+        anyhow::ensure!(
+            !(json && self.markdown),
+            "found --json and --markdown; allowed: one of them"
+        );
         let set = TextureSet::read(&self.reference)?;
         let is_asset = self
             .test
@@ -92,20 +104,24 @@ impl Compare {
             )
         } else {
             let test = TextureSet::read(&self.test)?;
-            let maps = set
-                .maps
-                .iter()
-                .map(|m| (m.name.clone(), m.channels()))
-                .collect();
+            let maps = quality::maps_of_set(&set);
             (set.texels, test.texels, maps, None)
         };
-        let quality = Quality::measure(&reference, &test, &maps)
+        let mask = match &self.mask {
+            None => None,
+            Some(path) => Some(read_mask(path, &reference[0])?),
+        };
+        let quality = Quality::measure_within(&reference, &test, &maps, mask.as_ref())
             .with_context(|| format!("{} and {}", self.reference.display(), self.test.display()))?;
         if json {
             let (bppc, profile) = rate.unzip();
             console::print_json(&json!({ "quality": quality, "bppc": bppc, "profile": profile }))?;
         } else {
-            console::print(&table(&quality));
+            console::print(&if self.markdown {
+                quality.markdown()
+            } else {
+                table(&quality)
+            });
             if let Some((rate, profile)) = rate {
                 console::print(&format!(
                     "{rate:.4} bits per pixel and channel, parameters counted; profile {profile}"
@@ -123,7 +139,26 @@ impl Compare {
     }
 }
 
-/// PSNR and SSIM per map and mip, as people read them.
+/// The mask in a grey image, which has the size of mip 0.
+fn read_mask(path: &Path, mip0: &Array3<f32>) -> anyhow::Result<Mask> {
+    let image = image::open(path).with_context(|| path.display().to_string())?;
+    let image = image.to_luma32f();
+    let (_, rows, columns) = mip0.dim();
+    let found = (image.width() as usize, image.height() as usize);
+    anyhow::ensure!(
+        found == (columns, rows),
+        "{}: found {} × {} texels; the set has {columns} × {rows}",
+        path.display(),
+        found.0,
+        found.1
+    );
+    let coverage = Array2::from_shape_fn((rows, columns), |(row, column)| {
+        image.get_pixel(column as u32, row as u32).0[0]
+    });
+    Ok(Mask::of_coverage(coverage))
+}
+
+/// PSNR and SSIM per map and mip, as people read them, and what angles and colours come to.
 pub(crate) fn table(quality: &Quality) -> String {
     let mip_count = quality.mips.len();
     let names: Vec<String> = (0..mip_count).map(|mip| format!("mip {mip}")).collect();
@@ -143,5 +178,39 @@ pub(crate) fn table(quality: &Quality) -> String {
         row(&map.map, &map.mips, map.overall);
     }
     row("all maps", &quality.mips, quality.overall);
-    table.to_string()
+    let mut text = table.to_string();
+    for line in quality.maps.iter().filter_map(beside) {
+        text += "\n";
+        text += &line;
+    }
+    text
+}
+
+/// What a map has beside PSNR and SSIM, over the whole chain.
+fn beside(map: &MapQuality) -> Option<String> {
+    if let Some(angles) = &map.angles {
+        let all = angles.overall;
+        let degrees = |value: Option<f64>| value.map_or("none".to_owned(), |v| format!("{v:.3}°"));
+        return Some(format!(
+            "{}: angle {} in the mean, {} for 95 of 100, {} at worst; {} of {} normals have none",
+            map.map,
+            degrees(all.mean),
+            degrees(all.p95),
+            degrees(all.worst),
+            all.undefined,
+            all.undefined + all.vectors
+        ));
+    }
+    let perceptual = map.perceptual.as_ref()?;
+    let left_out = perceptual.mips.iter().filter(|mip| mip.is_none()).count();
+    Some(match perceptual.overall {
+        Some(score) => format!(
+            "{}: SSIMULACRA2 {score:.2}, without {left_out} mips that are below {LEAST_SIDE} texels",
+            map.map
+        ),
+        None => format!(
+            "{}: no SSIMULACRA2, which needs {LEAST_SIDE} × {LEAST_SIDE} texels",
+            map.map
+        ),
+    })
 }

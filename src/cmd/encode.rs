@@ -1,5 +1,7 @@
 //! `ntmu encode`: an asset from a texture set.
 
+mod amounts;
+
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -23,6 +25,53 @@ pub(crate) struct Encode {
     /// How much work to spend: 0 to 100, or fastest, fast, medium, thorough, exhaustive.
     #[arg(long, default_value = "medium")]
     effort: String,
+    /// What to train, stage after stage, instead of what follows from the effort: paper,
+    /// paper-short, direct, encoder-first, or a TOML file.
+    #[arg(long, value_name = "PLAN", conflicts_with = "effort")]
+    plan: Option<String>,
+    /// Steps of each stage of the plan, `0+3000+1000`: those in the record of an asset repeat its
+    /// run.
+    #[arg(long, value_name = "STEPS", conflicts_with = "time")]
+    steps: Option<String>,
+    /// Train the latents directly in the plan's encoder stages, for as many steps.
+    #[arg(long)]
+    no_encoder: bool,
+    /// All learning rates, times this; a run that diverged can be resumed with less than 1.
+    #[arg(long, value_name = "FACTOR")]
+    rate_factor: Option<f64>,
+    /// How much a map's error counts in the loss, `normal=2`; 1 without it. Can be repeated.
+    #[arg(long, value_name = "MAP=WEIGHT", value_parser = amounts::weight)]
+    weight: Vec<(String, f64)>,
+    /// Leave out texels that do not show, from loss and figures: those where this map (its last
+    /// channel) or this image file (its alpha, or its colours) is zero.
+    #[arg(long, value_name = "MAP")]
+    mask: Option<String>,
+    /// Scale the vectors of a map of normals to unit length in every mip before training. Can be
+    /// repeated.
+    #[arg(long, value_name = "MAP")]
+    renormalise: Vec<String>,
+    /// How long to train, `15m`: the steps are scaled to fit before the first, and recorded.
+    #[arg(long, value_name = "TIME", value_parser = amounts::seconds)]
+    time: Option<f64>,
+    /// End as soon as the asset has this quality, in dB over all maps and mips; exit code 1 if it
+    /// never does.
+    #[arg(long, value_name = "DB")]
+    target_psnr: Option<f64>,
+    /// The largest asset to make, `300k`: grids get fewer channels, then bits, until it fits.
+    #[arg(long, value_name = "BYTES", value_parser = amounts::bytes)]
+    max_bytes: Option<u64>,
+    /// A folder for the maps as they would decode now, written anew every so often.
+    #[arg(long, value_name = "DIR")]
+    preview: Option<PathBuf>,
+    /// The time between two previews.
+    #[arg(long, value_name = "TIME", value_parser = amounts::seconds, default_value = "30s")]
+    preview_every: f64,
+    /// Only the middle of a preview, this many texels along each axis.
+    #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(1..))]
+    preview_side: Option<u32>,
+    /// A file with a line of JSON for every observation: stage, step, seconds, loss, dB, rates.
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
     /// The seed of every random choice: the same seed gives the same asset.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -83,4 +132,26 @@ impl Encode {
 }
 
 #[cfg(feature = "train")]
+mod curve;
+#[cfg(feature = "train")]
+mod log;
+#[cfg(feature = "train")]
+mod mask;
+#[cfg(feature = "train")]
+mod places;
+#[cfg(feature = "train")]
+mod preview;
+#[cfg(feature = "train")]
+mod progress;
+#[cfg(feature = "train")]
+mod resident;
+#[cfg(feature = "train")]
+mod result;
+#[cfg(feature = "train")]
+mod settings;
+#[cfg(feature = "train")]
+mod smaller;
+#[cfg(feature = "train")]
 mod training;
+#[cfg(feature = "train")]
+mod watcher;

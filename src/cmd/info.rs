@@ -3,9 +3,10 @@
 use crate::Verdict;
 use crate::{console, files};
 use ntmu::isa::Asset;
-use ntmu::isa::shape::LaneFormat;
+use ntmu::isa::shape::{LaneFormat, Shape};
 use ntmu::precision;
 use serde_json::json;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -31,10 +32,19 @@ fn describe(asset: &Asset) -> serde_json::Value {
     let grids: Vec<_> = (0..2)
         .map(|g| {
             let (width, height) = shape.grid_size(g);
+            let levels: Vec<_> = levels(shape)
+                .map(|(level, mips)| {
+                    let (width, height) = shape.level_size(g, level);
+                    json!({
+                        "width": width, "height": height,
+                        "first_mip": mips.start(), "last_mip": mips.end(),
+                    })
+                })
+                .collect();
             json!({
                 "width": width, "height": height, "channels": shape.grids[g].channels,
                 "bits": shape.grids[g].format.bits(), "scale_log2": shape.grids[g].scale_log2,
-                "sampling": shape.grids[g].sampling.name(),
+                "sampling": shape.grids[g].sampling.name(), "levels": levels,
             })
         })
         .collect();
@@ -67,6 +77,7 @@ fn describe(asset: &Asset) -> serde_json::Value {
         "mips": shape.mip_count, "channels": shape.channel_count(), "maps": maps,
         "grids": grids, "octaves": shape.octaves, "corner_snap": shape.snap.name(),
         "address_mode": shape.address_mode.name(), "inputs": shape.input_count(),
+        "pyramid": { "first": shape.pyramid.first(), "each": shape.pyramid.each() },
         "wave": shape.wave.name(), "padding": shape.padding, "input_bits": shape.input_bits,
         "precision": precision::of_asset(asset), "layers": layers,
         "macs_per_texel": asset.macs(),
@@ -75,6 +86,17 @@ fn describe(asset: &Asset) -> serde_json::Value {
         "bppc": ntmu::quality::bppc(asset),
         "profile": { "identity": profile.identity(), "choices": profile },
         "record": asset.metadata.record.iter().map(|(k, v)| json!([k, v])).collect::<Vec<_>>(),
+    })
+}
+
+/// The levels of the grids, each with the mips that it serves.
+fn levels(shape: &Shape) -> impl Iterator<Item = (u8, RangeInclusive<u8>)> {
+    let pyramid = shape.pyramid;
+    let mips = || 0..shape.mip_count;
+    (0..shape.level_count()).filter_map(move |level| {
+        let mut served = mips().filter(|&mip| pyramid.level_of(mip) == level);
+        let first = served.next()?;
+        Some((level, first..=served.last().unwrap_or(first)))
     })
 }
 
@@ -107,6 +129,18 @@ fn print(asset: &Asset) {
             &format!("grid {g}"),
             size,
             &format!("latents of {} bits", grid.format.bits()),
+        );
+    }
+    for (level, mips) in levels(shape).filter(|_| shape.level_count() > 1) {
+        let [grid0, grid1] = [0, 1].map(|g| {
+            let (width, height) = shape.level_size(g, level);
+            format!("{width} × {height}")
+        });
+        let (first, last) = mips.into_inner();
+        fact(
+            &format!("level {level} of the grids"),
+            format!("{grid0}, {grid1}"),
+            &format!("cells, for mips {first} to {last}"),
         );
     }
     fact(

@@ -1,10 +1,12 @@
 //! The verbs, one file each.
 
+mod analyse;
 mod asm;
 mod certify;
 mod compare;
 mod conform;
 mod convert;
+mod curve;
 mod decode;
 mod disasm;
 mod encode;
@@ -40,7 +42,7 @@ enum Verb {
     /// Decode, check, time and sweep an asset, and write a report; the built-in one by default.
     Study(study::Study),
     /// Train an asset on a texture set.
-    Encode(encode::Encode),
+    Encode(Box<encode::Encode>),
     /// Decode an asset to image files.
     Decode(decode::Decode),
     /// Show what an asset holds.
@@ -61,6 +63,10 @@ enum Verb {
     Disasm(disasm::Disasm),
     /// Compare an asset, or a decoded folder, with its source.
     Compare(compare::Compare),
+    /// Compare rate-distortion curves: Bjøntegaard deltas, plots, tables.
+    Curve(curve::CurveVerb),
+    /// Look into the grids of an asset: how alike their levels are, which frequencies they hold.
+    Analyse(analyse::Analyse),
     /// Write an asset in other numbers: fewer bits, fp16, another profile.
     Convert(convert::Convert),
     /// List the profiles, or print one: the choices that implementations make differently.
@@ -91,6 +97,8 @@ impl Arguments {
             Verb::Asm(verb) => verb.run(json),
             Verb::Disasm(verb) => verb.run(json),
             Verb::Compare(verb) => verb.run(json),
+            Verb::Curve(verb) => verb.run(json),
+            Verb::Analyse(verb) => verb.run(json),
             Verb::Conform(verb) => verb.run(json),
             Verb::Convert(verb) => verb.run(json),
             Verb::Profile(verb) => verb.run(json),

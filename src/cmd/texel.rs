@@ -75,7 +75,7 @@ fn describe(asset: &Asset, taps: &Taps) -> Value {
                 })
                 .collect();
             json!({
-                "first": [corners.x.first, corners.y.first], "stride": corners.x.stride,
+                "level": corners.level, "first": [corners.x.first, corners.y.first], "stride": corners.x.stride,
                 "phase_of_16": [corners.x.phase, corners.y.phase], "corners": cells,
             })
         })
@@ -187,9 +187,14 @@ fn print(asset: &Asset, taps: &Taps) {
     for (g, tap) in taps.grids.iter().enumerate() {
         let shape = asset.shape.grids[g];
         let (x, y) = (tap.corners.x, tap.corners.y);
+        let level = if asset.shape.level_count() > 1 {
+            format!(", level {}", tap.corners.level)
+        } else {
+            String::new()
+        };
         text.push_str(&format!(
-            "\ngrid {g}: first corner ({}, {}), stride {}, phase ({}, {})/16\n",
-            x.first, y.first, x.stride, x.phase, y.phase
+            "\ngrid {g}{}: first corner ({}, {}), stride {}, phase ({}, {})/16\n",
+            level, x.first, y.first, x.stride, x.phase, y.phase
         ));
         let codes = tap.codes.chunks(usize::from(shape.channels));
         for (c, ((cell, weight), codes)) in tap

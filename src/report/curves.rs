@@ -147,7 +147,7 @@ pub(super) fn line_class(colour: usize, is_dashed: bool) -> String {
 }
 
 /// Marks at 1, 2 and 5 times powers of ten, or at powers of ten alone where that would be many.
-pub(super) fn logarithmic_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
+pub(crate) fn logarithmic_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     let factors: &[f64] = if high - low > 2.5 {
         &[1.0]
     } else {

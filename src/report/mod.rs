@@ -27,6 +27,9 @@ mod tests;
 mod timing;
 mod variants;
 
+pub(crate) use curves::logarithmic_ticks;
+pub(crate) use svg::{Axis, px, shortened};
+
 use crate::study::Study;
 use maud::{DOCTYPE, PreEscaped, html as markup};
 use ndarray::ArrayView3;

@@ -13,22 +13,22 @@ pub(super) fn fill(index: usize) -> String {
 
 /// A linear map from values to pixels.
 #[derive(Clone, Copy)]
-pub(super) struct Axis {
+pub(crate) struct Axis {
     /// The values at both ends; they differ.
-    pub(super) values: (f64, f64),
+    pub(crate) values: (f64, f64),
     /// The pixels at both ends.
-    pub(super) pixels: (f64, f64),
+    pub(crate) pixels: (f64, f64),
 }
 
 impl Axis {
     /// Where a value lies.
-    pub(super) fn at(&self, value: f64) -> f64 {
+    pub(crate) fn at(&self, value: f64) -> f64 {
         let share = (value - self.values.0) / (self.values.1 - self.values.0);
         self.pixels.0 + share * (self.pixels.1 - self.pixels.0)
     }
 
     /// About `wanted` round values from end to end, each with its label.
-    pub(super) fn ticks(&self, wanted: u32) -> Vec<(f64, String)> {
+    pub(crate) fn ticks(&self, wanted: u32) -> Vec<(f64, String)> {
         let (low, high) = self.values;
         let step = round_step((high - low) / f64::from(wanted));
         let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
@@ -55,7 +55,7 @@ pub(super) fn round_step(least: f64) -> f64 {
 }
 
 /// A coordinate.
-pub(super) fn px(value: f64) -> String {
+pub(crate) fn px(value: f64) -> String {
     let text = format!("{value:.1}");
     if text == "-0.0" {
         "0.0".to_owned()
@@ -65,7 +65,7 @@ pub(super) fn px(value: f64) -> String {
 }
 
 /// The text cut to `most` characters, for labels that must not run into a chart.
-pub(super) fn shortened(text: &str, most: usize) -> String {
+pub(crate) fn shortened(text: &str, most: usize) -> String {
     if text.chars().count() <= most {
         return text.to_owned();
     }

@@ -1,6 +1,6 @@
 //! Heat: where on the screen lines of the latent cache were looked up and missed.
 
-mod colour;
+pub(crate) mod colour;
 mod digits;
 mod picture;
 

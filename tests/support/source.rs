@@ -21,5 +21,6 @@ pub(crate) fn brick_wall(size: u32) -> Source {
         maps: maps.collect(),
         outputs,
         mips: set.texels,
+        mask: None,
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::random::Stream;
 use crate::sampler::Texel;
+use crate::texels::Texels;
 
 /// The mip of a texel: in proportion to the mips' areas, ⌊−log4 u⌋ with u uniform, or with
 /// probability `uniform` any mip alike.
@@ -23,16 +24,21 @@ pub(crate) fn draw_mip(choice: f64, u: f64, mip_count: u8, uniform: f64) -> u8 {
     }
 }
 
-/// Texel `index` of a batch of the whole set.
-pub(crate) fn draw_texel(stream: Stream, index: u64, sizes: &[(u32, u32)], uniform: f64) -> Texel {
+/// Texel `index` of a batch of the whole set; none that is masked out.
+pub(crate) fn draw_texel(stream: Stream, index: u64, texels: &Texels, uniform: f64) -> Texel {
     let at = 4 * index;
-    let mip = draw_mip(
-        stream.unit(at),
-        stream.unit(at + 1),
-        sizes.len() as u8,
-        uniform,
-    );
-    let (width, height) = sizes[usize::from(mip)];
+    let mips = texels.sizes.len() as u8;
+    let mip = draw_mip(stream.unit(at), stream.unit(at + 1), mips, uniform);
+    let (width, height) = texels.sizes[usize::from(mip)];
+    if let Some(covered) = texels.covered(mip) {
+        let place = covered[stream.below(at + 2, covered.len() as u32) as usize];
+        return Texel {
+            x: place % width,
+            y: place / width,
+            mip,
+            window: 0,
+        };
+    }
     Texel {
         x: stream.below(at + 2, width),
         y: stream.below(at + 3, height),
@@ -72,9 +78,9 @@ impl Batch {
     }
 
     /// Draws every texel from the whole set.
-    pub(crate) fn draw(&mut self, stream: Stream, sizes: &[(u32, u32)], uniform: f64) {
+    pub(crate) fn draw(&mut self, stream: Stream, texels: &Texels, uniform: f64) {
         for (index, texel) in self.texels.iter_mut().enumerate() {
-            *texel = draw_texel(stream, index as u64, sizes, uniform);
+            *texel = draw_texel(stream, index as u64, texels, uniform);
         }
     }
 }

@@ -3,6 +3,7 @@
 use crate::choices::{ActivationKind, Precision};
 use crate::config::{BIAS_LIMIT, CHUNKS, TILE, TrainConfig, WIDEST};
 use crate::error::TrainError;
+use crate::plan::Plan;
 use crate::topology::Topology;
 use ntmu_isa::activation::MAX_LEAK_SHIFT;
 use ntmu_isa::embed::MAX_OCTAVES;
@@ -128,11 +129,9 @@ impl TrainConfig {
     fn check_training(&self) -> Result<(), TrainError> {
         range("encoder_width", self.encoder_width, 4, 512)?;
         multiple("encoder_width", u32::from(self.encoder_width), 2)?;
-        range("crop", self.crop, 64, 4096)?;
-        multiple("crop", self.crop, 64)?;
+        check_crop("crop", self.crop)?;
         range("crops", self.crops, 1, 64)?;
-        range("batch", self.batch, (CHUNKS * TILE) as u32, 1 << 22)?;
-        multiple("batch", self.batch, (CHUNKS * TILE) as u32)?;
+        check_batch("batch", self.batch)?;
         range("uniform_mips", self.uniform_mips, 0.0, 1.0)?;
         range("encoder_rate", self.encoder_rate, 0.0, 1.0)?;
         range("latent_rate", self.latent_rate, 0.0, 1.0)?;
@@ -140,14 +139,27 @@ impl TrainConfig {
         range("integer_rate", self.integer_rate, 0.0, 10.0)?;
         range("checkpoint_every", self.checkpoint_every, 1, u64::MAX)?;
         range("effort", self.effort, 0, 100)?;
-        if let Some(steps) = self.steps {
-            let most = 100_000_000;
-            range("steps.encoder", steps.encoder, 0, most)?;
-            range("steps.refine", steps.refine, 0, most)?;
-            range("steps.integer", steps.integer, 0, most)?;
+        range("rate_factor", self.rate_factor, 0.0, 10.0)?;
+        for (map, &weight) in &self.weights {
+            range(format!("weights.{map}"), weight, 0.0, 1e6)?;
         }
-        Ok(())
+        let week = 7.0 * 24.0 * 3600.0;
+        range("seconds", self.seconds.unwrap_or(1.0), 1.0, week)?;
+        range("target_psnr", self.target_psnr.unwrap_or(0.0), 0.0, 200.0)?;
+        self.plan.as_ref().map_or(Ok(()), Plan::check)
     }
+}
+
+/// Whether crops may have this side.
+pub(crate) fn check_crop(field: &str, crop: u32) -> Result<(), TrainError> {
+    range(field, crop, 64, 4096)?;
+    multiple(field, crop, 64)
+}
+
+/// Whether a step may have this many texels.
+pub(crate) fn check_batch(field: &str, batch: u32) -> Result<(), TrainError> {
+    range(field, batch, (CHUNKS * TILE) as u32, 1 << 22)?;
+    multiple(field, batch, (CHUNKS * TILE) as u32)
 }
 
 /// The most bits of what an integer layer reads, so that bias and products stay below 2^24, where
@@ -165,7 +177,7 @@ fn exact_bits(inputs: usize, weight_bits: u8, is_first: bool) -> u8 {
     bits as u8
 }
 
-fn range<T: PartialOrd + std::fmt::Display>(
+pub(crate) fn range<T: PartialOrd + std::fmt::Display>(
     field: impl Into<String>,
     found: T,
     low: T,

@@ -1,36 +1,49 @@
 //! Checkpoint: the state between two steps, as a file.
 //!
 //! ```text
-//! "NTMUCKP1"  identity u64  stage u8  step u64  psnr_float f64
+//! "NTMUCKP2"  identity u64  stage u32  step u64
+//! psnr_float f64  loss f64  least f64  seconds f64
+//! stages u32  then for each: steps u64
 //! count u32   then for each array: length u64, that many f32
 //! CRC-32 of everything before it
 //! ```
-//! All little endian. A file is written beside its place and renamed into it, so that an
+//! All little endian. A file is written beside its place, made durable and renamed, so that an
 //! interrupted write never replaces a good one.
 
 use crate::error::TrainError;
 use crate::model::{Ground, Model};
 use crate::quantise::Range;
-use crate::schedule::Stage;
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-const MAGIC: &[u8; 8] = b"NTMUCKP1";
+const MAGIC: &[u8; 8] = b"NTMUCKP2";
 
 /// Where a run is, between two steps.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Position {
-    pub(crate) stage: Stage,
+    /// The place in the list of stages that run.
+    pub(crate) stage: usize,
     /// Steps done in the stage.
     pub(crate) step: u64,
-    /// What the refinement ended with; 0 before.
+    /// What the last stage in reals ended with; 0 before.
     pub(crate) psnr_float: f64,
+    /// The smoothed loss in this stage, and the least that it was; no numbers before its first step.
+    pub(crate) loss: f64,
+    pub(crate) least: f64,
+    /// Seconds that the run has taken so far.
+    pub(crate) seconds: f64,
+    /// Steps of each stage that runs: a budget of time fixed them.
+    pub(crate) steps: Vec<u64>,
 }
 
 /// A number that two runs share exactly when they make the same asset.
 pub(crate) fn identity(ground: &Ground<'_>) -> Result<u64, TrainError> {
     let mut config = ground.config.clone();
-    // How often a run saves itself does not change what it makes.
+    // How often a run saves itself does not change what it makes; and other rates are the way on
+    // after a divergence.
     config.checkpoint_every = 1;
+    config.rate_factor = 1.0;
     let text = serde_json::to_string(&(
         &config,
         &ground.source.name,
@@ -42,7 +55,27 @@ pub(crate) fn identity(ground: &Ground<'_>) -> Result<u64, TrainError> {
 }
 
 /// Every array of the model, in the file's order.
-fn arrays(model: &mut Model) -> Vec<&mut Vec<f32>> {
+fn arrays(model: &Model) -> Vec<&[f32]> {
+    let mut out: Vec<&[f32]> = vec![
+        &model.parameters,
+        &model.moments.first,
+        &model.moments.second,
+        &model.encoder,
+        &model.encoder_moments.first,
+        &model.encoder_moments.second,
+    ];
+    for grid in &model.latents {
+        out.extend([
+            grid.values.as_slice(),
+            &grid.moments.first,
+            &grid.moments.second,
+        ]);
+    }
+    out
+}
+
+/// The same, to be replaced.
+fn arrays_mut(model: &mut Model) -> Vec<&mut Vec<f32>> {
     let [g0, g1] = &mut model.latents;
     let mut out = vec![
         &mut model.parameters,
@@ -62,10 +95,33 @@ fn arrays(model: &mut Model) -> Vec<&mut Vec<f32>> {
     out
 }
 
-fn put_array(bytes: &mut Vec<u8>, array: &[f32]) {
-    bytes.extend((array.len() as u64).to_le_bytes());
-    for value in array {
-        bytes.extend(value.to_le_bytes());
+/// Whether every number of the state is one.
+pub(crate) fn is_finite(model: &Model) -> bool {
+    let mut values = arrays(model).into_iter().flatten();
+    values.all(|value| value.is_finite())
+}
+
+/// A file under its checksum.
+struct Summed<W> {
+    inner: W,
+    hasher: crc32fast::Hasher,
+}
+
+impl<W: Write> Summed<W> {
+    fn put(&mut self, bytes: &[u8]) -> std::io::Result<()> {
+        self.hasher.update(bytes);
+        self.inner.write_all(bytes)
+    }
+
+    fn put_array(&mut self, array: &[f32]) -> std::io::Result<()> {
+        self.put(&(array.len() as u64).to_le_bytes())?;
+        let mut bytes = Vec::new();
+        for block in array.chunks(1 << 14) {
+            bytes.clear();
+            bytes.extend(block.iter().flat_map(|value| value.to_le_bytes()));
+            self.put(&bytes)?;
+        }
+        Ok(())
     }
 }
 
@@ -73,36 +129,67 @@ fn put_array(bytes: &mut Vec<u8>, array: &[f32]) {
 pub(crate) fn write(
     path: &Path,
     identity: u64,
-    position: Position,
+    position: &Position,
     model: &Model,
 ) -> Result<(), TrainError> {
-    let mut model = model.clone();
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend(identity.to_le_bytes());
-    bytes.push(position.stage as u8);
-    bytes.extend(position.step.to_le_bytes());
-    bytes.extend(position.psnr_float.to_le_bytes());
+    let beside = part(path);
+    let written =
+        put(&beside, identity, position, model).and_then(|()| std::fs::rename(&beside, path));
+    written.map_err(|cause| {
+        // What is half written helps nobody; the file system has said what is wrong already.
+        std::fs::remove_file(&beside).ok();
+        TrainError::Io {
+            path: path.to_owned(),
+            cause,
+        }
+    })
+}
+
+/// Where a checkpoint is written before it is renamed.
+fn part(path: &Path) -> PathBuf {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    PathBuf::from(beside)
+}
+
+fn put(path: &Path, identity: u64, position: &Position, model: &Model) -> std::io::Result<()> {
+    let mut file = Summed {
+        inner: BufWriter::new(File::create(path)?),
+        hasher: crc32fast::Hasher::new(),
+    };
+    file.put(MAGIC)?;
+    file.put(&identity.to_le_bytes())?;
+    file.put(&(position.stage as u32).to_le_bytes())?;
+    file.put(&position.step.to_le_bytes())?;
+    let Position {
+        psnr_float,
+        loss,
+        least,
+        seconds,
+        ..
+    } = position;
+    for value in [psnr_float, loss, least, seconds] {
+        file.put(&value.to_le_bytes())?;
+    }
+    file.put(&(position.steps.len() as u32).to_le_bytes())?;
+    for steps in &position.steps {
+        file.put(&steps.to_le_bytes())?;
+    }
     let ranges: Vec<f32> = model
         .ranges
         .iter()
         .flat_map(|r| [r.scale, f32::from(r.zero_point)])
         .collect();
-    let arrays = arrays(&mut model);
-    bytes.extend((arrays.len() as u32 + 1).to_le_bytes());
+    let arrays = arrays(model);
+    file.put(&(arrays.len() as u32 + 1).to_le_bytes())?;
     for array in arrays {
-        put_array(&mut bytes, array);
+        file.put_array(array)?;
     }
-    put_array(&mut bytes, &ranges);
-    bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
-    let io = |cause| TrainError::Io {
-        path: path.to_owned(),
-        cause,
-    };
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".part");
-    let beside = PathBuf::from(beside);
-    std::fs::write(&beside, &bytes).map_err(io)?;
-    std::fs::rename(&beside, path).map_err(io)
+    file.put_array(&ranges)?;
+    let Summed { mut inner, hasher } = file;
+    inner.write_all(&hasher.finalize().to_le_bytes())?;
+    inner.flush()?;
+    inner.get_ref().sync_all()
 }
 
 /// A cursor over bytes whose checksum is known to be right.
@@ -138,6 +225,14 @@ impl<'a> Reader<'a> {
         Ok(u64::from_le_bytes(self.array()?))
     }
 
+    fn u32(&mut self) -> Result<u32, TrainError> {
+        Ok(u32::from_le_bytes(self.array()?))
+    }
+
+    fn f64(&mut self) -> Result<f64, TrainError> {
+        Ok(f64::from_le_bytes(self.array()?))
+    }
+
     fn floats(&mut self) -> Result<Vec<f32>, TrainError> {
         let len = self.u64()?;
         let bytes = usize::try_from(len).ok().and_then(|l| l.checked_mul(4));
@@ -153,8 +248,14 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Reads the state from `path` into `model`, which is a fresh one of the same run.
-pub(crate) fn read(path: &Path, identity: u64, model: &mut Model) -> Result<Position, TrainError> {
+/// Reads the state from `path` into `model`, which is a fresh one of the same run of `stages`
+/// stages.
+pub(crate) fn read(
+    path: &Path,
+    identity: u64,
+    stages: usize,
+    model: &mut Model,
+) -> Result<Position, TrainError> {
     let file = std::fs::read(path).map_err(|cause| TrainError::Io {
         path: path.to_owned(),
         cause,
@@ -165,7 +266,10 @@ pub(crate) fn read(path: &Path, identity: u64, model: &mut Model) -> Result<Posi
     }
     let (body, crc) = file.split_at(file.len() - 4);
     if crc32fast::hash(body).to_le_bytes() != crc {
-        return Err(reader.refuse("damaged or truncated bytes", "those that were written"));
+        return Err(reader.refuse(
+            "damaged or truncated bytes",
+            "those that were written, whole",
+        ));
     }
     reader.bytes = &body[MAGIC.len()..];
     let found = reader.u64()?;
@@ -175,14 +279,24 @@ pub(crate) fn read(path: &Path, identity: u64, model: &mut Model) -> Result<Posi
             format!("{identity:016x}: the same configuration and texture set"),
         ));
     }
-    let [stage] = reader.array()?;
-    let Some(&stage) = Stage::ALL.get(usize::from(stage)) else {
-        return Err(reader.refuse(format!("stage {stage}"), "0..=2"));
-    };
+    let stage = reader.u32()? as usize;
     let step = reader.u64()?;
-    let psnr_float = f64::from_le_bytes(reader.array()?);
-    let count = u32::from_le_bytes(reader.array()?);
-    let targets = arrays(model);
+    let [psnr_float, loss, least, seconds] =
+        [reader.f64()?, reader.f64()?, reader.f64()?, reader.f64()?];
+    let found = reader.u32()? as usize;
+    if found != stages {
+        return Err(reader.refuse(format!("{found} stages"), stages.to_string()));
+    }
+    let steps = (0..stages)
+        .map(|_| reader.u64())
+        .collect::<Result<Vec<_>, _>>()?;
+    match steps.get(stage) {
+        Some(&all) if step <= all => {}
+        Some(all) => return Err(reader.refuse(format!("step {step}"), format!("0..={all}"))),
+        None => return Err(reader.refuse(format!("stage {stage}"), format!("0..{stages}"))),
+    }
+    let count = reader.u32()?;
+    let targets = arrays_mut(model);
     if count as usize != targets.len() + 1 {
         return Err(reader.refuse(format!("{count} arrays"), format!("{}", targets.len() + 1)));
     }
@@ -208,5 +322,9 @@ pub(crate) fn read(path: &Path, identity: u64, model: &mut Model) -> Result<Posi
         stage,
         step,
         psnr_float,
+        loss,
+        least,
+        seconds,
+        steps,
     })
 }

@@ -6,6 +6,7 @@ use ntmu_isa::shape::Sampling;
 use serde::{Deserialize, Serialize};
 
 pub use ntmu_isa::preset::ActivationKind;
+pub use ntmu_isa::pyramid::Pyramid;
 
 /// Where the first corner lies when the stride is more than one cell; see
 /// [`ntmu_isa::position::CornerSnap`].
@@ -142,6 +143,95 @@ impl Precision {
         match self {
             Precision::Int8 => "int8",
             Precision::Fp16 => "fp16",
+        }
+    }
+}
+
+/// The pyramids that have a name in configurations.
+pub const PYRAMIDS: [(&str, Pyramid); 3] = [
+    ("single", Pyramid::SINGLE),
+    ("ntc", Pyramid::NTC),
+    ("every-mip", Pyramid::EVERY_MIP),
+];
+
+/// A pyramid in a configuration's file: by its name, or by its two numbers.
+pub(crate) mod pyramid {
+    use super::{PYRAMIDS, Pyramid};
+    use serde::de::Error as _;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    #[serde(untagged)]
+    enum Written<N> {
+        Name(N),
+        Numbers { first: u8, each: u8 },
+    }
+
+    pub(crate) fn serialize<S: Serializer>(
+        pyramid: &Pyramid,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        let (first, each) = (pyramid.first(), pyramid.each());
+        let named = PYRAMIDS.iter().find(|(_, known)| known == pyramid);
+        named
+            .map_or(Written::Numbers { first, each }, |(name, _)| {
+                Written::Name(name)
+            })
+            .serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'d, D: Deserializer<'d>>(
+        deserializer: D,
+    ) -> Result<Pyramid, D::Error> {
+        let (found, pyramid) = match Written::<String>::deserialize(deserializer)? {
+            Written::Name(name) => {
+                let named = PYRAMIDS.iter().find(|(known, _)| *known == name);
+                (name, named.map(|(_, pyramid)| *pyramid))
+            }
+            Written::Numbers { first, each } => (
+                format!("first {first}, each {each}"),
+                Pyramid::new(first, each),
+            ),
+        };
+        pyramid.ok_or_else(|| {
+            let names = PYRAMIDS.map(|(name, _)| name).join(", ");
+            D::Error::custom(format!(
+                "pyramid: found {found}; allowed: {names}, 1 ≤ each ≤ first ≤ 15, or 0 and 0"
+            ))
+        })
+    }
+
+    #[cfg(test)]
+    mod tests {
+        use super::*;
+
+        #[derive(Serialize, Deserialize)]
+        struct Field {
+            #[serde(with = "super")]
+            pyramid: Pyramid,
+        }
+
+        fn read(text: &str) -> Result<Pyramid, serde_json::Error> {
+            serde_json::from_str::<Field>(&format!("{{\"pyramid\":{text}}}")).map(|f| f.pyramid)
+        }
+
+        #[test]
+        fn every_pyramid_is_written_and_read_back_and_what_is_none_is_refused() {
+            for (first, each) in (0..=255).flat_map(|f| [0, 1, 2, 3, 15, 16].map(|e| (f, e))) {
+                let numbers = format!("{{\"first\":{first},\"each\":{each}}}");
+                let Some(pyramid) = Pyramid::new(first, each) else {
+                    assert!(read(&numbers).unwrap_err().to_string().contains("allowed"));
+                    continue;
+                };
+                assert_eq!(read(&numbers).unwrap(), pyramid);
+                let text = serde_json::to_value(Field { pyramid }).unwrap();
+                assert_eq!(read(&text["pyramid"].to_string()).unwrap(), pyramid);
+            }
+            for (name, pyramid) in PYRAMIDS {
+                assert_eq!(read(&format!("\"{name}\"")).unwrap(), pyramid);
+            }
+            assert!(read("\"none\"").is_err());
+            assert!(read("{\"first\":4}").is_err());
         }
     }
 }

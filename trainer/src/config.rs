@@ -1,11 +1,13 @@
 //! Everything that decides what a training run makes.
 
-use crate::choices::{ActivationKind, Address, GridSampling, Precision, Snap, WaveForm};
+use crate::choices::{ActivationKind, Address, GridSampling, Precision, Pyramid, Snap, WaveForm};
 use crate::error::TrainError;
+use crate::plan::Plan;
 use ntmu_isa::embed::WAVES_PER_OCTAVE;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::shape::GridShape;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// One grid of latents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,21 +20,6 @@ pub struct GridConfig {
     pub scale_log2: u8,
 }
 
-/// Steps of each stage, in the order in which they run.
-///
-/// A step count is part of the configuration and never follows from a clock, so that the same
-/// configuration makes the same bytes on a slow day.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Steps {
-    /// Encoder, constructors and synthesizer on crops, uniform noise on the latents.
-    pub encoder: u64,
-    /// Latents and synthesizer on the whole set, uniform noise on the latents.
-    pub refine: u64,
-    /// The same with rounded latents and the synthesizer as the unit computes it: in integers, or
-    /// in fp16 where the layers are.
-    pub integer: u64,
-}
-
 /// Everything that decides what a training run makes.
 ///
 /// Two runs with equal configurations on equal texture sets and the same machine type give equal
@@ -42,6 +29,10 @@ pub struct Steps {
 pub struct TrainConfig {
     /// Grid 0 and grid 1.
     pub grids: [GridConfig; 2],
+    /// Which level of the grids serves a mip: `"single"`, `"ntc"`, `"every-mip"`, or
+    /// `{ first = 4, each = 2 }`.
+    #[serde(with = "crate::choices::pyramid")]
+    pub pyramid: Pyramid,
     /// What each grid gives the synthesizer. CNTC concatenates the corners of grid 0 and
     /// interpolates grid 1.
     pub sampling: [GridSampling; 2],
@@ -77,30 +68,40 @@ pub struct TrainConfig {
     pub activation_bits: u8,
     /// Channels of the encoder's convolutions, a multiple of 2; ELIC has 192.
     pub encoder_width: u16,
-    /// Side of a training crop in texels of mip 0, a multiple of 64 from 64 to 4096.
+    /// Side of a training crop in texels of mip 0, a multiple of 64 from 64 to 4096, where the plan
+    /// says nothing else; so are the next six.
     pub crop: u32,
-    /// Crops in a step of the encoder stage.
+    /// Crops in a step of an encoder stage.
     pub crops: u16,
-    /// Texels in a step, a multiple of 768 (eight chunks of whole tiles).
+    /// Texels in a step, a multiple of 768 (eight chunks of whole tiles); a small set gets fewer.
     pub batch: u32,
     /// The share of texels whose mip is drawn uniformly, 0..=1.
     pub uniform_mips: f64,
-    /// Whether the latents are parameters of their own after the encoder stage. The paper keeps
-    /// the encoder to the end; without this flag the grids stay what the encoder made them, and
-    /// only the synthesizer is trained further.
-    pub refine_latents: bool,
     /// Learning rate of the encoder and its constructors.
     pub encoder_rate: f64,
     /// Learning rate of the latents, whose reals are −½..=½.
     pub latent_rate: f64,
     /// Learning rate of the synthesizer.
     pub synthesizer_rate: f64,
-    /// Both of these rates in the integer stage, as a factor.
+    /// All rates in the deployed stage of the plan that follows from an effort, as a factor.
     pub integer_rate: f64,
+    /// All rates of every stage, as a factor. A run may be resumed with another: it is the way on
+    /// after a divergence.
+    pub rate_factor: f64,
+    /// How much the squared error of a map's channels counts in the loss, by the map's name; 1 for a
+    /// map that is not named. The weights are scaled so that their mean over all channels is 1.
+    pub weights: BTreeMap<String, f64>,
     /// How much work to spend, 0..=100; see [`TrainConfig::with_effort`].
     pub effort: u8,
-    /// Steps of each stage; without them they follow from the effort and the set's texels.
-    pub steps: Option<Steps>,
+    /// What is trained, stage after stage; without it that follows from the effort and the set's
+    /// texels.
+    pub plan: Option<Plan>,
+    /// Seconds that the run may take, evaluation included: before the first step the steps of all
+    /// stages are scaled by one factor so that they fit.
+    pub seconds: Option<f64>,
+    /// Decibels over every texel of every mip and channel at which the run ends, once the asset
+    /// reaches them.
+    pub target_psnr: Option<f64>,
     /// The seed of every random number.
     pub seed: u64,
     /// Steps between two checkpoints.

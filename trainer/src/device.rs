@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Backend {
-    /// The processor: this crate's own kernels, and burn's flex backend for the encoder.
+    /// The processor: this crate's own kernels.
     #[default]
     Flex,
     /// burn's WGSL kernels through wgpu: any adapter, a software one too. Feature `wgpu`.

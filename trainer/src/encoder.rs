@@ -2,8 +2,8 @@
 //!
 //! The architecture is ELIC's analysis transform (He et al. 2022) without attention and with three
 //! of its four halvings: conv 5×5/2, three residual bottleneck blocks, conv 5×5/2, three blocks,
-//! conv 5×5/2, ½·tanh; then one 1×1 convolution for each grid. A grid at less than 1/8 of the
-//! resolution takes several cells from each output position.
+//! conv 5×5/2, ½·tanh; then one 1×1 convolution for each grid. What its planes are is said in
+//! [`crate::constructor`].
 //!
 //! Parameters live in one flat slice, so that they are updated, saved and restored like those of
 //! the synthesizer. [`crate::encoder_pass`] runs it on the processor; what is here runs it on burn's
@@ -41,7 +41,8 @@ pub(crate) struct Encoder {
 }
 
 impl Encoder {
-    pub(crate) fn new(config: &TrainConfig, channels: usize) -> Encoder {
+    /// The encoder of a set of `channels` channels to two grids of `planes` planes.
+    pub(crate) fn new(config: &TrainConfig, channels: usize, planes: [usize; 2]) -> Encoder {
         let width = usize::from(config.encoder_width);
         // ELIC's bottleneck has 320 channels at width 192.
         let bottleneck = width * 5 / 3;
@@ -58,9 +59,8 @@ impl Encoder {
             }
         }
         encoder.push(width, bottleneck, 5, 2);
-        for grid in &config.grids {
-            let cells = 1 << (2 * (SCALE_LOG2 - grid.scale_log2));
-            encoder.push(bottleneck, usize::from(grid.channels) * cells, 1, 1);
+        for planes in planes {
+            encoder.push(bottleneck, planes, 1, 1);
         }
         encoder
     }
@@ -195,33 +195,4 @@ pub(crate) fn backward_from(outputs: [Tensor<4>; 2], gradients: [Tensor<4>; 2]) 
     // The scalar product with a constant has that constant as its gradient: what was computed
     // outside burn's graph enters it here.
     ((o0 * g0).sum() + (o1 * g1).sum()).backward()
-}
-
-/// Calls `each(in tensor, in cells)` for every latent of `items` tensors of `rows` × `columns`
-/// positions: from the layout of [`Pass::grids`] to whole cells together, item after item.
-pub(crate) fn for_latents(
-    (items, rows, columns): (usize, usize, usize),
-    channels: usize,
-    scale_log2: u8,
-    mut each: impl FnMut(usize, usize),
-) {
-    let side = 1_usize << (SCALE_LOG2 - scale_log2);
-    for item in 0..items {
-        for channel in 0..channels {
-            for sub in 0..side * side {
-                let plane = (item * channels + channel) * side * side + sub;
-                for row in 0..rows {
-                    let y = row * side + sub / side;
-                    for column in 0..columns {
-                        let x = column * side + sub % side;
-                        let cell = (item * rows * side + y) * columns * side + x;
-                        each(
-                            (plane * rows + row) * columns + column,
-                            cell * channels + channel,
-                        );
-                    }
-                }
-            }
-        }
-    }
 }

@@ -10,7 +10,7 @@ use crate::kernel::{Vectorised, vectorised};
 use crate::network::Network;
 use crate::positions::Positions;
 use crate::sampler::{Embedding, Texel, Window};
-use crate::source::Texels;
+use crate::texels::Texels;
 use crate::tile::Workspace;
 use crate::topology::Topology;
 use rayon::prelude::*;
@@ -174,10 +174,10 @@ impl Pass<'_> {
                 c0[i] = corners[0].map(|at| at as u32);
                 c1[i] = corners[1].map(|at| at as u32);
                 (w0[i], w1[i]) = (lerp[0], lerp[1]);
-                target.copy_from_slice(view.texels.texel(texel.x, texel.y, texel.mip));
+                view.texels.target(texel.x, texel.y, texel.mip, target);
             }
             workspace.forward(view.network);
-            *error += workspace.compare(view.network, targets, scale);
+            *error += workspace.compare(view.network, targets, &view.texels.weights, scale);
             workspace.backward(view.network, sum, gradient);
         }
     }

@@ -2,6 +2,17 @@
 
 use std::path::PathBuf;
 
+/// A checkpoint from which a run can go on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Good {
+    /// The file.
+    pub path: PathBuf,
+    /// The stage.
+    pub stage: &'static str,
+    /// Steps done in the stage.
+    pub step: u64,
+}
+
 /// Where, what was found, what is allowed.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
@@ -33,8 +44,15 @@ pub enum TrainError {
         /// Every name, separated by commas.
         allowed: String,
     },
-    /// The loss is no longer a number.
-    #[error("the loss is {loss} in stage {stage} at step {step}; a lower learning rate may help")]
+    /// The loss is no longer a number, or far above what it was.
+    #[error("the loss is {loss} in stage {stage} at step {step}: the run diverged; {}", match .good {
+        Some(good) => format!(
+            "the last good checkpoint is {}, from stage {} at step {}: resume it with lower rates \
+             (a rate factor below 1)",
+            good.path.display(), good.stage, good.step,
+        ),
+        None => "there is no checkpoint from before; lower the learning rates".to_owned(),
+    })]
     Diverged {
         /// The stage.
         stage: &'static str,
@@ -42,6 +60,8 @@ pub enum TrainError {
         step: u64,
         /// The loss found there.
         loss: f64,
+        /// The last good checkpoint.
+        good: Option<Good>,
     },
     /// The caller asked for the run to stop.
     #[error("stopped in stage {stage} at step {step}; {}", match .checkpoint {
@@ -72,7 +92,6 @@ pub enum TrainError {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        #[source]
         cause: std::io::Error,
     },
     /// The backend that was asked for cannot be had.

@@ -17,7 +17,7 @@ const TILES: usize = 64;
 pub(crate) struct Errors {
     /// Sum of squared errors of each channel of each mip.
     sums: Vec<Vec<f64>>,
-    /// Texels of each mip.
+    /// Texels of each mip that are not masked out.
     counts: Vec<u64>,
 }
 
@@ -46,11 +46,12 @@ pub(crate) fn decibels(mean_squared_error: f64) -> f64 {
     -10.0 * mean_squared_error.log10()
 }
 
-/// The error of every texel under `view`.
+/// The error of every texel under `view` that is not masked out.
 pub(crate) fn evaluate(topology: &Topology, view: View<'_>) -> Errors {
     let sizes = &view.texels.sizes;
     let channels = view.texels.channels;
-    let texels: Vec<Texel> = all_texels(sizes).collect();
+    let mut texels: Vec<Texel> = all_texels(sizes).collect();
+    texels.retain(|t| view.texels.is_covered(t.x, t.y, t.mip));
     let partial: Vec<Vec<f64>> = texels
         .par_chunks(TILE * TILES)
         .map_init(
@@ -73,9 +74,8 @@ pub(crate) fn evaluate(topology: &Topology, view: View<'_>) -> Errors {
     }
     Errors {
         sums: sums.chunks(channels).map(<[f64]>::to_vec).collect(),
-        counts: sizes
-            .iter()
-            .map(|&(w, h)| u64::from(w) * u64::from(h))
+        counts: (0..sizes.len() as u8)
+            .map(|mip| view.texels.counted(mip))
             .collect(),
     }
 }

@@ -29,7 +29,7 @@ pub(crate) fn shape_of(config: &TrainConfig, source: &Source) -> Result<Shape, T
         input_bits: config.input_bits,
         snap: config.snap.into(),
         address_mode: config.address.into(),
-        pyramid: ntmu_isa::pyramid::Pyramid::SINGLE,
+        pyramid: config.pyramid,
         grids: [config.grid_shape(0)?, config.grid_shape(1)?],
         outputs: source.outputs.clone(),
     })

@@ -19,7 +19,8 @@ pub(crate) enum Rounding {
 /// Latents of one task of the parallel update.
 const BLOCK: usize = 1 << 14;
 
-/// One grid, whole cells together, in units of its codes: a latent is isa's value, not rounded.
+/// One grid, its levels one after the other, whole cells together, in units of its codes: a latent
+/// is isa's value, not rounded.
 #[derive(Clone, Debug)]
 pub(crate) struct Latents {
     pub(crate) format: LatentFormat,
@@ -43,7 +44,8 @@ impl Latents {
         }
     }
 
-    fn limits(&self) -> (f32, f32) {
+    /// The smallest and the largest value.
+    pub(crate) fn limits(&self) -> (f32, f32) {
         (
             self.format.min_value() as f32,
             self.format.max_value() as f32,

@@ -11,23 +11,26 @@
 //! |---|---|
 //! | [`Source`], [`TrainConfig`], [`Preset`] | what goes in |
 //! | `positions`, `sampler` | which inputs a texel has: isa's integer formulas, tabulated |
+//! | `encoder`, `convolution`, `constructor`, `crop` | latents from an encoder, level by level |
 //! | `topology`, `network`, `epilogue`, `tile`, `kernel` | the synthesizer, forward and backward |
 //! | `quantise`, `integer`, `half`, `calibrate` | the numbers of the decode that stand for it |
 //! | `export` | the asset |
 //! | `latents`, `adam`, `batch`, `engine`, `refine` | a step on the whole set |
-//! | `encoder`, `convolution`, `crop` | CNTC's encoder, and a step on crops |
-//! | `device`, `graph` | the steps in reals on a GPU, through burn |
-//! | `schedule`, `train`, `checkpoint`, `report` | the run |
+//! | [`TrainingDevice`], `graph`, `stepper` | the steps in reals on a GPU, through burn |
+//! | [`Plan`], [`Stage`], `schedule` | what is trained, in which order, how fast |
+//! | `train`, `run`, `budget`, `checkpoint`, `record`, `report` | the run |
 
 #![forbid(unsafe_code)]
 
 mod adam;
 mod batch;
+mod budget;
 mod calibrate;
 mod check_config;
 mod checkpoint;
 mod choices;
 mod config;
+mod constructor;
 mod convolution;
 mod crop;
 mod device;
@@ -43,30 +46,44 @@ mod half;
 mod integer;
 mod kernel;
 mod latents;
+mod memory;
 mod model;
 mod network;
+mod plan;
 mod positions;
 mod preset;
 mod quantise;
 mod random;
+mod record;
 mod refine;
 mod report;
+mod run;
 mod sampler;
 mod schedule;
+mod size;
 mod source;
+mod stage;
+mod stepper;
+mod texels;
 mod tile;
 mod topology;
 mod train;
 
-pub use choices::{ActivationKind, Address, GridSampling, Precision, Snap, WaveForm};
-pub use config::{GridConfig, Steps, TrainConfig};
+pub use choices::{
+    ActivationKind, Address, GridSampling, PYRAMIDS, Precision, Pyramid, Snap, WaveForm,
+};
+pub use config::{GridConfig, TrainConfig};
 pub use device::{Backend, TrainingDevice};
-pub use error::TrainError;
+pub use error::{Good, TrainError};
+pub use memory::Memory;
+pub use plan::{Arithmetic, Fall, Mips, Plan, RatesPlan, Shown, StagePlan, Train};
 pub use preset::Preset;
-pub use report::{Progress, StageReport, TrainReport, Trained};
-pub use schedule::{EFFORTS, Stage};
+pub use report::{Progress, StageReport, TrainReport, Trained, Watch};
+pub use schedule::EFFORTS;
+pub use size::asset_bytes;
 pub use source::Source;
-pub use train::train;
+pub use stage::{Rates, Stage};
+pub use train::{train, watched};
 
 #[cfg(test)]
 mod tests;

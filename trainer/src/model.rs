@@ -9,7 +9,8 @@ use crate::positions::Positions;
 use crate::quantise::Range;
 use crate::random::{Purpose, Stream};
 use crate::sampler::{Embedding, Numbers};
-use crate::source::{Source, Texels, real_range};
+use crate::source::{Source, real_range};
+use crate::texels::Texels;
 use crate::topology::Topology;
 use ntmu_isa::shape::OutputFormat;
 
@@ -31,7 +32,7 @@ impl<'a> Ground<'a> {
         config: &'a TrainConfig,
         source: &'a Source,
     ) -> Result<Ground<'a>, TrainError> {
-        let texels = Texels::new(source);
+        let texels = Texels::new(source, config)?;
         Ok(Ground {
             config,
             source,
@@ -97,10 +98,9 @@ impl Model {
     pub(crate) fn new(ground: &Ground<'_>) -> Result<Model, TrainError> {
         let seed = ground.config.seed;
         let grid = |g: usize| -> Result<Latents, TrainError> {
-            let (width, height) = ground.positions.grid_sizes[g];
             Ok(Latents::new(
                 ground.config.grid_shape(g)?,
-                width as usize * height as usize,
+                ground.positions.cells(g),
             ))
         };
         let mut latents = [grid(0)?, grid(1)?];
@@ -122,6 +122,7 @@ impl Model {
     /// Forgets every moment: a stage starts afresh.
     pub(crate) fn forget_moments(&mut self) {
         self.moments = Moments::zero(self.parameters.len());
+        self.encoder_moments = Moments::zero(self.encoder.len());
         for latents in &mut self.latents {
             latents.moments = Moments::zero(latents.values.len());
         }

@@ -1,4 +1,4 @@
-//! Positions: every texel's corners, phases and waves, tabulated from isa's formulas.
+//! Positions: every texel's level, corners, phases and waves, tabulated from isa's formulas.
 //!
 //! The decode computes them anew for each texel; a step needs them a hundred thousand times, so
 //! they are made once for each axis of each mip. The tables hold what isa's functions returned
@@ -11,7 +11,7 @@ use ntmu_isa::shape::Shape;
 /// One axis of a texel: its corners in both grids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct AxisEntry {
-    /// The two corners, as cells, of each grid.
+    /// The two corners in each grid, as cells of the level that serves the mip.
     pub(crate) cells: [[u32; 2]; 2],
     /// The weight of the second corner in each grid, in sixteenths.
     pub(crate) phase: [u8; 2],
@@ -25,25 +25,52 @@ struct AxisTable {
     waves: Vec<f32>,
 }
 
+/// One level of one grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Level {
+    /// Cells along x and y.
+    pub(crate) size: [u32; 2],
+    /// Cells of the levels before it.
+    pub(crate) base: usize,
+}
+
+impl Level {
+    pub(crate) const fn cells(&self) -> usize {
+        self.size[0] as usize * self.size[1] as usize
+    }
+}
+
 /// The tables of a set.
 #[derive(Debug)]
 pub(crate) struct Positions {
     /// Along x and along y, for each mip.
     axes: [Vec<AxisTable>; 2],
     /// The level input of each mip.
-    levels: Vec<f32>,
+    level_inputs: Vec<f32>,
     waves_per_axis: usize,
-    /// Cells of each grid along x and y.
-    pub(crate) grid_sizes: [(u32, u32); 2],
+    /// The level of the grids that serves each mip.
+    served_by: Vec<u8>,
+    /// The levels of each grid, level 0 first.
+    pub(crate) levels: [Vec<Level>; 2],
 }
 
 impl Positions {
     pub(crate) fn new(shape: &Shape) -> Positions {
         let mips = 0..shape.mip_count;
-        let grid_sizes = [shape.grid_size(0), shape.grid_size(1)];
-        let table = |texels: u32, mip: u8, cells: [u32; 2]| AxisTable {
+        let levels = [0, 1].map(|g: usize| -> Vec<Level> {
+            let mut base = 0;
+            let levels = (0..shape.level_count()).map(|level| {
+                let (width, height) = shape.level_size(g, level);
+                let size = [width, height];
+                let level = Level { size, base };
+                base += level.cells();
+                level
+            });
+            levels.collect()
+        });
+        let table = |axis: usize, texels: u32, mip: u8| AxisTable {
             entries: (0..texels)
-                .map(|texel| entry(shape, texel, mip, cells))
+                .map(|texel| entry(shape, axis, texel, mip))
                 .collect(),
             waves: (0..texels)
                 .flat_map(|texel| {
@@ -56,22 +83,40 @@ impl Positions {
                 })
                 .collect(),
         };
-        let [(w0, h0), (w1, h1)] = grid_sizes;
         Positions {
             axes: [
                 mips.clone()
-                    .map(|m| table(shape.mip_size(m).0, m, [w0, w1]))
+                    .map(|m| table(0, shape.mip_size(m).0, m))
                     .collect(),
                 mips.clone()
-                    .map(|m| table(shape.mip_size(m).1, m, [h0, h1]))
+                    .map(|m| table(1, shape.mip_size(m).1, m))
                     .collect(),
             ],
-            levels: mips
+            level_inputs: mips
+                .clone()
                 .map(|m| level_input(m, shape.mip_count, shape.input_bits) as f32)
                 .collect(),
             waves_per_axis: 2 * usize::from(shape.octaves),
-            grid_sizes,
+            served_by: mips.map(|m| shape.pyramid.level_of(m)).collect(),
+            levels,
         }
+    }
+
+    /// The level of the grids that serves a mip.
+    #[inline(always)]
+    pub(crate) fn level_of(&self, mip: u8) -> usize {
+        usize::from(self.served_by[usize::from(mip)])
+    }
+
+    /// Levels of each grid.
+    #[inline(always)]
+    pub(crate) const fn level_count(&self) -> usize {
+        self.levels[0].len()
+    }
+
+    /// Cells of all levels of a grid.
+    pub(crate) fn cells(&self, grid: usize) -> usize {
+        self.levels[grid].iter().map(Level::cells).sum()
     }
 
     /// The corners of texel `texel` of mip `mip` along x (0) or y (1).
@@ -102,16 +147,21 @@ impl Positions {
             out[3] = y[1] * scale;
         }
         rest.fill(0.0);
-        rest[0] = self.levels[mip] * scale;
+        rest[0] = self.level_inputs[mip] * scale;
     }
 }
 
-fn entry(shape: &Shape, texel: u32, mip: u8, cells: [u32; 2]) -> AxisEntry {
+fn entry(shape: &Shape, axis: usize, texel: u32, mip: u8) -> AxisEntry {
     let snap: CornerSnap = shape.snap;
-    let of = |g: usize| AxisPosition::of(texel, mip, shape.grids[g].scale_log2, snap);
+    let level = shape.pyramid.level_of(mip);
+    let as_mip = shape.pyramid.mip_in_level(mip);
+    let of = |g: usize| AxisPosition::of(texel, as_mip, shape.grids[g].scale_log2, snap);
     let positions = [of(0), of(1)];
     AxisEntry {
-        cells: [0, 1].map(|g: usize| positions[g].corners(cells[g], shape.address_mode)),
+        cells: [0, 1].map(|g: usize| {
+            let (width, height) = shape.level_size(g, level);
+            positions[g].corners([width, height][axis], shape.address_mode)
+        }),
         // Sixteenths at texel centres, so below 16.
         phase: positions.map(|p| p.phase as u8),
     }

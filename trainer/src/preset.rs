@@ -1,9 +1,10 @@
 //! Presets: configurations with a name.
 
-use crate::choices::Precision;
+use crate::choices::{Precision, Pyramid};
 use crate::config::{GridConfig, TrainConfig};
 use crate::error::TrainError;
 use ntmu_isa::preset;
+use std::collections::BTreeMap;
 use std::ops::Deref;
 
 /// A configuration with a name: one of isa's shapes, and how to train it.
@@ -55,6 +56,11 @@ impl Preset {
                 bits: grid.format.bits(),
                 scale_log2: grid.scale_log2,
             }),
+            pyramid: if self.name.starts_with("ntc-") {
+                Pyramid::NTC
+            } else {
+                self.pyramid
+            },
             sampling: self.grids.map(|grid| grid.sampling.into()),
             hidden: self.hidden.to_vec(),
             residual_blocks: self.residual_blocks,
@@ -75,7 +81,6 @@ impl Preset {
             crops: 4,
             batch: 12_288,
             uniform_mips: 0.1,
-            refine_latents: true,
             encoder_rate: 1e-3,
             latent_rate: 0.01,
             // A wider layer moves further at the same rate.
@@ -85,8 +90,12 @@ impl Preset {
                 0.02
             },
             integer_rate: 0.6,
+            rate_factor: 1.0,
+            weights: BTreeMap::new(),
             effort: 50,
-            steps: None,
+            plan: None,
+            seconds: None,
+            target_psnr: None,
             seed: 0,
             checkpoint_every: 2000,
         }

@@ -8,25 +8,14 @@ use crate::evaluate::{Errors, evaluate};
 use crate::latents::Rounding;
 use crate::model::{Ground, Model};
 use crate::network::Network;
+use crate::plan::{Shown, Train};
 use crate::quantise::{Quantised, Range, Widths, quantise};
 use crate::random::{Purpose, Stream};
 use crate::sampler::{Numbers, Window};
-use crate::schedule::Stage;
+use crate::stage::{Rates, Stage};
 
 /// Texels that calibrate the activations.
 const CALIBRATION: usize = 4096;
-
-/// The numbers of a stage's random streams: no two stages share one.
-pub(crate) const fn stream_step(stage: Stage, step: u64) -> u64 {
-    ((stage as u64) << 48) | step
-}
-
-/// The learning rates of one step.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Rates {
-    pub(crate) latents: f64,
-    pub(crate) synthesizer: f64,
-}
 
 impl Model {
     /// What the unit would show of the latents.
@@ -66,11 +55,11 @@ impl Model {
         let texels: Vec<_> = (0..CALIBRATION as u64)
             .map(|i| {
                 let uniform = ground.config.uniform_mips;
-                crate::batch::draw_texel(stream, i, &ground.texels.sizes, uniform)
+                crate::batch::draw_texel(stream, i, &ground.texels, uniform)
             })
             .collect();
         let network = self.real(ground);
-        let windows = [Window::whole(&ground.positions)];
+        let windows = Window::whole(&ground.positions);
         let view = self.view(ground, &network, Numbers::Real, &windows);
         let bits = ground.config.activation_bits;
         calibrate(&ground.topology, view, &texels, bits)
@@ -98,28 +87,28 @@ impl Model {
         &mut self,
         ground: &Ground<'_>,
         engine: &mut Engine,
-        stage: Stage,
+        stage: &Stage,
         step: u64,
         rates: Rates,
     ) -> f64 {
-        let at = stream_step(stage, step);
+        let at = stage.stream(step);
         let config = ground.config;
-        let quantised = (stage == Stage::Integer).then(|| self.quantised(ground));
+        let quantised = stage.is_deployed().then(|| self.quantised(ground));
         let numbers = if quantised.is_some() {
             Numbers::Integer
         } else {
             Numbers::Real
         };
         let noise = Stream::new(config.seed, Purpose::Noise, at).noise_key();
-        self.show(|grid| match numbers {
-            Numbers::Real => Rounding::Noise(noise.wrapping_add(grid)),
-            Numbers::Integer => Rounding::Nearest,
+        self.show(|grid| match stage.latents {
+            Shown::Noise => Rounding::Noise(noise.wrapping_add(grid)),
+            Shown::Rounded => Rounding::Nearest,
         });
         let stream = Stream::new(config.seed, Purpose::Batch, at);
         engine
             .batch
-            .draw(stream, &ground.texels.sizes, config.uniform_mips);
-        let windows = [Window::whole(&ground.positions)];
+            .draw(stream, &ground.texels, stage.uniform_mips);
+        let windows = Window::whole(&ground.positions);
         let loss = match &quantised {
             Some(q) => engine.step(self.view(ground, &q.network, numbers, &windows)),
             None => {
@@ -134,7 +123,7 @@ impl Model {
         let rate = Rate::new(rates.synthesizer, step + 1);
         self.moments
             .update(rate, &mut self.parameters, &engine.parameters);
-        if config.refine_latents {
+        if stage.train == Train::Latents {
             let embedding = ground.embedding(numbers);
             let [g0, g1] = &mut self.latents;
             engine.scatter(embedding, [&mut g0.gradient, &mut g1.gradient]);
@@ -154,7 +143,7 @@ impl Model {
             Numbers::Real => self.real(ground),
             Numbers::Integer => self.quantised(ground).network,
         };
-        let windows = [Window::whole(&ground.positions)];
+        let windows = Window::whole(&ground.positions);
         evaluate(
             &ground.topology,
             self.view(ground, &network, numbers, &windows),

@@ -1,8 +1,8 @@
 //! What a run tells while it works and when it is done.
 
-use crate::config::{Steps, TrainConfig};
+use crate::config::TrainConfig;
 use crate::device::Backend;
-use crate::schedule::Stage;
+use crate::stage::{Rates, Stage};
 use ntmu_isa::Asset;
 use serde::{Deserialize, Serialize};
 
@@ -17,23 +17,52 @@ pub struct Progress {
     pub stage_steps: u64,
     /// Steps done in all stages.
     pub done: u64,
-    /// Steps of all stages. They cost about the same in the refinement and the integer stage; one
-    /// of the encoder stage costs far more.
+    /// Steps of all stages. They cost about the same in every stage but those of an encoder, where
+    /// one costs far more.
     pub total: u64,
-    /// The mean squared error of the batches, smoothed over about a hundred steps. A batch is
-    /// richer in coarse mips than the set.
+    /// The mean squared error of the batches, each map's times its weight, smoothed over about a
+    /// hundred steps. A batch is richer in coarse mips than the set.
     pub loss: f64,
     /// The same in decibels against a peak of 1.
     pub psnr: f64,
+    /// Decibels of the asset over every texel of every mip and channel, where this step measured
+    /// them.
+    pub deployed_psnr: Option<f64>,
+    /// The learning rates of the last step.
+    pub rates: Rates,
+    /// Seconds since the run began, those of the processes that it was resumed from included.
+    pub seconds: f64,
+}
+
+/// What listens to a run. A closure over [`Progress`] does.
+pub trait Watch {
+    /// Hears of every twentieth step, of the last of each stage, and of those at which the asset's
+    /// quality was measured.
+    fn observe(&mut self, progress: &Progress);
+
+    /// Whether [`Watch::asset`] should be called now. Nothing that the run makes depends on it.
+    fn wants_asset(&mut self) -> bool {
+        false
+    }
+
+    /// Takes the asset as it would be if the run ended here.
+    fn asset(&mut self, _progress: &Progress, _asset: &Asset) {}
+}
+
+impl<F: FnMut(&Progress) + ?Sized> Watch for F {
+    fn observe(&mut self, progress: &Progress) {
+        self(progress);
+    }
 }
 
 /// One stage of a finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StageReport {
+    /// Its name.
+    pub name: String,
     /// The stage.
+    #[serde(flatten)]
     pub stage: Stage,
-    /// Its steps.
-    pub steps: u64,
     /// Seconds spent in it by this process, evaluation included: less than all where the run was
     /// resumed.
     pub seconds: f64,
@@ -43,7 +72,8 @@ pub struct StageReport {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrainReport {
     /// Decibels over every texel of every mip and channel (the paper's measure) of the network in
-    /// reals with rounded latents, as the refinement left it.
+    /// reals with rounded latents, as the last stage in reals left it. Here and below, a texel that
+    /// is masked out does not count.
     pub psnr_float: f64,
     /// The same of the asset: the decode's own numbers throughout, codes compared with the source's
     /// reals.
@@ -56,8 +86,10 @@ pub struct TrainReport {
     pub bits_per_texel_channel: f64,
     /// Multiplications per texel.
     pub macs: u64,
-    /// Steps of each stage.
-    pub steps: Steps,
+    /// Steps of each stage of the plan, 0 for one that the set is too small for.
+    pub steps: Vec<u64>,
+    /// Whether the asset reached [`TrainConfig::target_psnr`].
+    pub reached: Option<bool>,
     /// The seed.
     pub seed: u64,
     /// What computed the stages in reals, at the end of the run.

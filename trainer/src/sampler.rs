@@ -11,11 +11,14 @@ pub(crate) struct Texel {
     pub(crate) x: u32,
     pub(crate) y: u32,
     pub(crate) mip: u8,
-    /// Which [`Window`] holds its cells.
+    /// Which crop holds its cells: the first of as many [`Window`]s as there are levels, over that
+    /// number.
     pub(crate) window: u16,
 }
 
-/// The part of the grids that is in memory: all of them, or those of one crop.
+/// The part of one level of the grids that is in memory: all of it, or that of one crop.
+///
+/// Windows lie in a slice crop after crop, the levels of a crop together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Window {
     /// The first cell of each grid along x and y.
@@ -29,14 +32,23 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// The window that holds everything.
-    pub(crate) fn whole(positions: &Positions) -> Window {
-        Window {
-            origin: [[0; 2]; 2],
-            size: positions.grid_sizes.map(|(w, h)| [w, h]),
-            period: positions.grid_sizes.map(|(w, h)| [w, h]),
-            base: [0; 2],
-        }
+    /// The windows that hold everything, one for each level.
+    pub(crate) fn whole(positions: &Positions) -> Vec<Window> {
+        let of_level = |level: usize| {
+            let levels = [0, 1].map(|g: usize| positions.levels[g][level]);
+            Window {
+                origin: [[0; 2]; 2],
+                size: levels.map(|l| l.size),
+                period: levels.map(|l| l.size),
+                base: levels.map(|l| l.base),
+            }
+        };
+        (0..positions.level_count()).map(of_level).collect()
+    }
+
+    /// Cells of a grid in it.
+    pub(crate) const fn cells(&self, grid: usize) -> usize {
+        self.size[grid][0] as usize * self.size[grid][1] as usize
     }
 }
 
@@ -101,7 +113,8 @@ impl Embedding {
     ) -> ([[usize; 4]; 2], [[f32; 4]; 2]) {
         let x = positions.axis(0, texel.x, texel.mip);
         let y = positions.axis(1, texel.y, texel.mip);
-        let window = &windows[usize::from(texel.window)];
+        let level = positions.level_of(texel.mip);
+        let window = &windows[usize::from(texel.window) * positions.level_count() + level];
         let mut out = [[0; 4]; 2];
         for g in 0..2 {
             let [width, height] = window.period[g];

@@ -1,53 +1,7 @@
-//! Schedule: how many steps each stage has, and the learning rate at each of them.
+//! Schedule: the plan that follows from an effort, and the learning rate at each step of a stage.
 
-use crate::config::{CHUNKS, Steps, TILE, TrainConfig};
-use serde::{Deserialize, Serialize};
-
-/// The stages, in the order in which they run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Stage {
-    /// Encoder, constructors and synthesizer on crops.
-    Encoder,
-    /// Latents and synthesizer on the whole set.
-    Refine,
-    /// Latents and the synthesizer as the unit computes it: in integers, or in fp16 where the layers
-    /// are.
-    Integer,
-}
-
-impl Stage {
-    /// Every stage, in order.
-    pub const ALL: [Stage; 3] = [Stage::Encoder, Stage::Refine, Stage::Integer];
-
-    /// The name in progress lines, errors and records.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Stage::Encoder => "encoder",
-            Stage::Refine => "refine",
-            Stage::Integer => "integer",
-        }
-    }
-}
-
-impl Steps {
-    /// Steps of one stage.
-    #[must_use]
-    pub const fn of(&self, stage: Stage) -> u64 {
-        match stage {
-            Stage::Encoder => self.encoder,
-            Stage::Refine => self.refine,
-            Stage::Integer => self.integer,
-        }
-    }
-
-    /// Steps of all stages.
-    #[must_use]
-    pub const fn total(&self) -> u64 {
-        self.encoder + self.refine + self.integer
-    }
-}
+use crate::config::{CHUNKS, TILE, TrainConfig};
+use crate::plan::{Arithmetic, Fall, Mips, Plan, RatesPlan, Shown, StagePlan, Train};
 
 /// Passes over all texels of all mips in the refinement and the integer stage together, at
 /// efforts 0, 10, 50 and 100; between them the logarithm is interpolated.
@@ -76,23 +30,16 @@ pub const EFFORTS: [(&str, u8); 5] = [
     ("exhaustive", 100),
 ];
 
-/// The steps of each stage for a set of `texels` texels in all its mips.
-pub(crate) fn steps(config: &TrainConfig, texels: u64, batch: usize) -> Steps {
-    if let Some(steps) = config.steps {
-        return steps;
-    }
+/// The plan of the configuration's effort for a set of `texels` texels in all its mips.
+pub(crate) fn plan(config: &TrainConfig, texels: u64, batch: usize) -> Plan {
     let passes = interpolate(&PASSES, f64::from(config.effort));
     let steps = (passes * texels as f64 / batch as f64)
         .max(LEAST * passes)
         .round();
-    let integer = (INTEGER_SHARE * steps).round();
+    let deployed = (INTEGER_SHARE * steps).round();
     let (from, most) = ENCODER;
     let encoder = (most * (f64::from(config.effort) - from) / (100.0 - from)).max(0.0);
-    Steps {
-        encoder: encoder as u64,
-        refine: (steps - integer) as u64,
-        integer: integer as u64,
-    }
+    config.usual_plan([encoder as u64, (steps - deployed) as u64, deployed as u64])
 }
 
 /// Steps that a pass over the texels has at least, before the batch grows to the configured one: a
@@ -131,7 +78,7 @@ impl TrainConfig {
     #[must_use]
     pub fn with_effort(mut self, effort: u8) -> TrainConfig {
         self.effort = effort.min(100);
-        self.steps = None;
+        self.plan = None;
         self.encoder_width = if self.effort > 90 { 64 } else { 32 };
         self.batch = match self.effort {
             0..=20 => 3072,
@@ -142,8 +89,52 @@ impl TrainConfig {
     }
 }
 
+impl TrainConfig {
+    /// The plan that an effort gives, with these steps: encoder, latents in reals, latents in the
+    /// numbers of the decode.
+    #[must_use]
+    pub fn usual_plan(&self, [encoder, latents, deployed]: [u64; 3]) -> Plan {
+        let stage = |train, steps, latents, numbers| StagePlan {
+            train,
+            steps,
+            least_side: 0,
+            latents,
+            numbers,
+            rates: RatesPlan::default(),
+            rate_factor: 1.0,
+            fall: Fall::Cosine,
+            warm_up: WARM_UP,
+            crop: None,
+            crops: None,
+            batch: None,
+            mips: Mips::Corners,
+            uniform_mips: None,
+        };
+        let last = stage(
+            Train::Latents,
+            deployed,
+            Shown::Rounded,
+            Arithmetic::Deployed,
+        );
+        Plan {
+            name: USUAL.to_owned(),
+            stage: vec![
+                stage(Train::Encoder, encoder, Shown::Noise, Arithmetic::Real),
+                stage(Train::Latents, latents, Shown::Noise, Arithmetic::Real),
+                StagePlan {
+                    rate_factor: self.integer_rate,
+                    ..last
+                },
+            ],
+        }
+    }
+}
+
+/// The name of the plan that an effort gives.
+pub(crate) const USUAL: &str = "effort";
+
 /// Steps over which a rate rises from nothing.
-const WARM_UP: f64 = 100.0;
+const WARM_UP: u64 = 100;
 
 /// What is left of a rate at the end of a stage that falls to the floor.
 const FLOOR: f64 = 0.01;
@@ -154,10 +145,13 @@ pub(crate) fn fall(at: f64) -> f64 {
 }
 
 /// The factor at step `step` (from 0) of `steps`, with a warm-up of at most a tenth of them.
-pub(crate) fn factor(step: u64, steps: u64) -> f64 {
-    let warm = WARM_UP.min(0.1 * steps as f64).max(1.0);
+pub(crate) fn factor(how: Fall, warm_up: u64, step: u64, steps: u64) -> f64 {
+    let warm = (warm_up as f64).min(0.1 * steps as f64).max(1.0);
     let rise = ((step + 1) as f64 / warm).min(1.0);
-    rise * fall(step as f64 / steps.max(1) as f64)
+    match how {
+        Fall::Constant => rise,
+        Fall::Cosine => rise * fall(step as f64 / steps.max(1) as f64),
+    }
 }
 
 #[cfg(test)]
@@ -166,11 +160,19 @@ mod tests {
 
     #[test]
     fn the_factor_rises_falls_and_stays_positive() {
-        let of = |step| factor(step, 10_000);
+        let of = |step| factor(Fall::Cosine, WARM_UP, step, 10_000);
         assert!(of(0) < of(50) && of(50) < of(100));
         assert!(of(100) > of(5000) && of(5000) > of(9999));
         assert!((0..10_000).all(|s| of(s) > 0.0 && of(s) <= 1.0));
-        assert!(factor(0, 1) > 0.0);
+        assert!(factor(Fall::Cosine, WARM_UP, 0, 1) > 0.0);
+    }
+
+    #[test]
+    fn a_constant_rate_without_a_warm_up_is_the_rate_at_every_step() {
+        for (step, steps) in [(0, 1), (0, 1000), (500, 1000), (999, 1000)] {
+            assert_eq!(factor(Fall::Constant, 0, step, steps), 1.0);
+        }
+        assert!(factor(Fall::Constant, 100, 0, 1000) < factor(Fall::Constant, 100, 99, 1000));
     }
 
     #[test]

@@ -1,11 +1,10 @@
 //! The texture set to train on.
 
 use crate::error::TrainError;
-use ndarray::Array3;
+use ndarray::{Array2, Array3};
 use ntmu_isa::asset::Map;
 use ntmu_isa::limits;
 use ntmu_isa::shape::{OutputFormat, Shape};
-use rayon::prelude::*;
 
 /// A texture set with its mip chain.
 #[derive(Clone, Debug)]
@@ -20,6 +19,10 @@ pub struct Source {
     pub outputs: Vec<OutputFormat>,
     /// The maps, in channel order; together they hold every channel once.
     pub maps: Vec<Map>,
+    /// Which texels of mip 0 count, by `[row, column]`; all of them without it. A texel of another
+    /// mip counts if any that lies below it does. The others are left out of the loss and of what
+    /// the run measures.
+    pub mask: Option<Array2<bool>>,
 }
 
 impl Source {
@@ -73,6 +76,23 @@ impl Source {
                 format!("{channels}, one a channel"),
             ));
         }
+        if let Some(mask) = &self.mask {
+            if mask.dim() != (height, width) {
+                let (rows, columns) = mask.dim();
+                return Err(TrainError::source(
+                    "mask",
+                    format!("{columns}×{rows}"),
+                    format!("{width}×{height}"),
+                ));
+            }
+            if !mask.iter().any(|&counts| counts) {
+                return Err(TrainError::source(
+                    "mask",
+                    "no texel",
+                    "at least one that counts",
+                ));
+            }
+        }
         for (m, mip) in self.mips.iter().enumerate() {
             let expected = (channels, (height >> m).max(1), (width >> m).max(1));
             if mip.dim() != expected {
@@ -94,6 +114,84 @@ impl Source {
         }
         Ok(())
     }
+
+    /// Width and height of every mip.
+    #[must_use]
+    pub fn sizes(&self) -> Vec<(u32, u32)> {
+        let sizes = self.mips.iter().map(|mip| mip.dim());
+        sizes
+            .map(|(_, height, width)| (width as u32, height as u32))
+            .collect()
+    }
+
+    /// The channels of the map with this name.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn channels_of(&self, map: &str) -> Result<std::ops::Range<usize>, TrainError> {
+        let Some(found) = self.maps.iter().find(|m| m.name == map) else {
+            let names: Vec<&str> = self.maps.iter().map(|m| m.name.as_str()).collect();
+            return Err(TrainError::source("map", map, names.join(", ")));
+        };
+        let first = usize::from(found.first_channel);
+        Ok(first..first + usize::from(found.channel_count))
+    }
+
+    /// Leaves out the texels at which the last channel of a map (its alpha, where it has one) is
+    /// zero in mip 0.
+    ///
+    /// # Errors
+    /// When there is no such map.
+    pub fn mask_with(&mut self, map: &str) -> Result<(), TrainError> {
+        let channel = self.channels_of(map)?.end - 1;
+        let Some(first) = self.mips.first() else {
+            return Err(TrainError::source("mips", "none", "at least mip 0"));
+        };
+        let plane = first.outer_iter().nth(channel);
+        self.mask = plane.map(|plane| plane.mapv(|value| value != 0.0));
+        Ok(())
+    }
+
+    /// Scales the vectors of a map of normals, in every mip, to unit length: the mean of unit
+    /// vectors, which a mip holds, is shorter. A vector of no length stays.
+    ///
+    /// A channel that leaves as unorm holds (component + 1) / 2, one that leaves as snorm the
+    /// component.
+    ///
+    /// # Errors
+    /// When there is no such map, or it has not three channels.
+    pub fn renormalise(&mut self, map: &str) -> Result<(), TrainError> {
+        let channels = self.channels_of(map)?;
+        if channels.len() != 3 {
+            let found = format!("{} channels", channels.len());
+            return Err(TrainError::source(
+                format!("map {map}"),
+                found,
+                "three, x, y and z, to renormalise",
+            ));
+        }
+        let first = channels.start;
+        let is_signed = self.outputs[first] == OutputFormat::Snorm8;
+        let (scale, offset, low) = if is_signed {
+            (1.0, 0.0, -1.0)
+        } else {
+            (2.0, -1.0, 0.0)
+        };
+        for mip in &mut self.mips {
+            let (_, height, width) = mip.dim();
+            for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+                let normal = [0, 1, 2].map(|c| mip[[first + c, y, x]] * scale + offset);
+                let length = normal.iter().map(|n| n * n).sum::<f32>().sqrt();
+                if length > 0.0 {
+                    for (c, n) in normal.into_iter().enumerate() {
+                        let value = (n / length - offset) / scale;
+                        mip[[first + c, y, x]] = value.clamp(low, 1.0);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The reals that a format can emit.
@@ -102,108 +200,19 @@ pub(crate) fn real_range(format: OutputFormat) -> (f32, f32) {
     (low as f32 / high as f32, 1.0)
 }
 
-/// The texels of every mip, channels of a texel together.
-///
-/// A step reads a few ten thousand texels from all over the set, so a texel must be one cache
-/// line, not one line for each channel.
-#[derive(Debug)]
-pub(crate) struct Texels {
-    pub(crate) channels: usize,
-    /// Width and height of every mip.
-    pub(crate) sizes: Vec<(u32, u32)>,
-    mips: Vec<Vec<f32>>,
-}
-
-impl Texels {
-    pub(crate) fn new(source: &Source) -> Texels {
-        let channels = source.outputs.len();
-        let mips = source.mips.iter().map(|mip| {
-            let (_, height, width) = mip.dim();
-            let mut out = vec![0.0; channels * height * width];
-            out.par_chunks_mut(channels * width)
-                .enumerate()
-                .for_each(|(row, out)| {
-                    for (channel, plane) in mip.outer_iter().enumerate() {
-                        for (texel, &value) in plane.row(row).iter().enumerate() {
-                            out[texel * channels + channel] = value;
-                        }
-                    }
-                });
-            out
-        });
-        let sizes = source
-            .mips
-            .iter()
-            .map(|m| (m.dim().2 as u32, m.dim().1 as u32))
-            .collect();
-        Texels {
-            channels,
-            sizes,
-            mips: mips.collect(),
-        }
-    }
-
-    /// The channels of one texel.
-    #[inline(always)]
-    pub(crate) fn texel(&self, x: u32, y: u32, mip: u8) -> &[f32] {
-        let (width, _) = self.sizes[usize::from(mip)];
-        let at = (y as usize * width as usize + x as usize) * self.channels;
-        &self.mips[usize::from(mip)][at..at + self.channels]
-    }
-
-    /// The texels of each mip, row by row, whole texels together.
-    pub(crate) fn mips(&self) -> &[Vec<f32>] {
-        &self.mips
-    }
-
-    /// The value of each channel that has only one.
-    pub(crate) fn constants(&self) -> Vec<Option<f32>> {
-        let of = |channel: usize| {
-            let first = self.mips.first()?.get(channel)?;
-            let mut all = self.mips.iter().flat_map(|m| m.chunks_exact(self.channels));
-            all.all(|texel| texel[channel] == *first).then_some(*first)
-        };
-        (0..self.channels).map(of).collect()
-    }
-
-    /// The mean of a channel over the coarsest mip.
-    pub(crate) fn mean(&self, channel: usize) -> f32 {
-        let Some(coarsest) = self.mips.last() else {
-            return 0.0;
-        };
-        let texels = coarsest.chunks_exact(self.channels);
-        let count = texels.len() as f32;
-        texels.map(|t| t[channel]).sum::<f32>() / count
-    }
-
-    /// Every texel of every mip.
-    pub(crate) fn count(&self) -> u64 {
-        self.sizes
-            .iter()
-            .map(|&(w, h)| u64::from(w) * u64::from(h))
-            .sum()
-    }
-
-    /// A number that changes when any value does.
-    pub(crate) fn fingerprint(&self) -> u32 {
-        let mut hasher = crc32fast::Hasher::new();
-        for &(w, h) in &self.sizes {
-            hasher.update(&w.to_le_bytes());
-            hasher.update(&h.to_le_bytes());
-        }
-        let mut bytes = Vec::new();
-        for block in self.mips.iter().flat_map(|m| m.chunks(1 << 14)) {
-            bytes.clear();
-            bytes.extend(block.iter().flat_map(|v| v.to_le_bytes()));
-            hasher.update(&bytes);
-        }
-        hasher.finalize()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn map(name: &str, first_channel: u16, channel_count: u16) -> Map {
+        Map {
+            name: name.into(),
+            first_channel,
+            channel_count,
+            encoding: ntmu_isa::asset::Encoding::Linear,
+            bit_depth: 8,
+        }
+    }
 
     fn source(width: usize, height: usize) -> Source {
         Source {
@@ -211,6 +220,7 @@ mod tests {
             mips: vec![Array3::from_elem((2, height, width), 0.5)],
             outputs: vec![OutputFormat::Unorm8; 2],
             maps: Vec::new(),
+            mask: None,
         }
     }
 
@@ -244,15 +254,54 @@ mod tests {
     }
 
     #[test]
-    fn texels_keep_channels_together_and_the_fingerprint_sees_every_value() {
-        let mut s = source(5, 3);
-        s.mips[0][[1, 2, 4]] = 0.25;
-        let texels = Texels::new(&s);
-        assert_eq!(texels.texel(4, 2, 0), [0.5, 0.25]);
-        assert_eq!(texels.texel(4, 1, 0), [0.5, 0.5]);
-        assert_ne!(
-            texels.fingerprint(),
-            Texels::new(&source(5, 3)).fingerprint()
+    fn renormalised_vectors_have_unit_length_in_every_mip_and_the_zero_vector_stays() {
+        for (format, zero) in [(OutputFormat::Unorm8, 0.5), (OutputFormat::Snorm8, 0.0)] {
+            let mut s = source(4, 4);
+            s.outputs = vec![format; 4];
+            s.maps = vec![map("alpha", 0, 1), map("normal", 1, 3)];
+            let value =
+                |(c, y, x): (usize, usize, usize)| 0.2 + 0.1 * c as f32 + 0.05 * (x + y) as f32;
+            s.mips = [4, 2, 1]
+                .map(|n| Array3::from_shape_fn((4, n, n), value))
+                .to_vec();
+            let alpha = s.mips.clone();
+            for c in 1..4 {
+                s.mips[1][[c, 0, 0]] = zero;
+            }
+            s.renormalise("normal").unwrap();
+            s.validate().unwrap();
+            for (mip, alpha) in s.mips.iter().zip(&alpha) {
+                let (_, h, w) = mip.dim();
+                for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
+                    assert_eq!(mip[[0, y, x]], alpha[[0, y, x]]);
+                    let square: f32 = (1..4)
+                        .map(|c| ((mip[[c, y, x]] - zero) / (1.0 - zero)).powi(2))
+                        .sum();
+                    let is_zero = h == 2 && (y, x) == (0, 0);
+                    // Three squares of numbers with 24 bits, and a root.
+                    let expected = if is_zero { 0.0 } else { 1.0 };
+                    assert!((square - expected).abs() < 8.0 * f32::EPSILON, "{square}");
+                }
+            }
+            assert!(s.renormalise("alpha").is_err() && s.renormalise("color").is_err());
+        }
+    }
+
+    #[test]
+    fn a_mask_of_another_size_and_one_that_leaves_nothing_are_refused() {
+        let mut s = source(4, 3);
+        s.mask = Some(Array2::from_elem((4, 3), true));
+        assert!(s.validate().unwrap_err().to_string().contains("mask"));
+        s.mask = Some(Array2::from_elem((3, 4), false));
+        assert!(s.validate().unwrap_err().to_string().contains("no texel"));
+        s.mips[0][[1, 2, 3]] = 0.0;
+        s.maps = vec![map("color", 0, 2)];
+        s.mask_with("color").unwrap();
+        s.validate().unwrap();
+        let mask = s.mask.unwrap();
+        assert!(
+            mask.indexed_iter()
+                .all(|(at, &counts)| counts == (at != (2, 3)))
         );
     }
 }

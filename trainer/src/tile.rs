@@ -73,13 +73,20 @@ impl Workspace {
         }
     }
 
-    /// The squared error of the outputs against `targets` (texels × channels, unpadded), summed;
-    /// and its gradient, times `scale`, in place of the outputs' gradient.
+    /// The squared error of the outputs against `targets` (texels × channels, unpadded), each
+    /// channel's times its weight, summed; and its gradient, times `scale`, in place of the outputs'
+    /// gradient. A target that is no number is masked out and counts nothing.
     ///
     /// An output is compared after it is limited to what its format can emit, and the gradient
     /// passes the limit unchanged: an output beyond a limit that the target sits on costs nothing
     /// and is left alone, one whose target lies inside is pulled back.
-    pub(crate) fn compare(&mut self, network: &Network, targets: &[f32], scale: f32) -> f64 {
+    pub(crate) fn compare(
+        &mut self,
+        network: &Network,
+        targets: &[f32],
+        weights: &[f32],
+        scale: f32,
+    ) -> f64 {
         let last = network.layers.len() - 1;
         let layer = &network.layers[last];
         let (columns, channels) = (layer.shape.columns(), layer.shape.outputs);
@@ -87,13 +94,13 @@ impl Workspace {
         let slope = &self.slopes[last];
         let mut sum = 0.0_f32;
         for (row, target) in targets.chunks_exact(channels).enumerate() {
-            for (channel, &target) in target.iter().enumerate() {
+            for (channel, (&target, &weight)) in target.iter().zip(weights).enumerate() {
                 let at = row * columns + channel;
                 let unit = 1.0 / layer.unit(channel);
                 let real = (out[at] * unit).clamp(network.low[channel], 1.0);
-                let error = real - target;
-                sum += error * error;
-                gradient[at] = 2.0 * scale * error * unit * slope[at];
+                let error = if target.is_nan() { 0.0 } else { real - target };
+                sum += weight * (error * error);
+                gradient[at] = weight * (2.0 * scale * error * unit * slope[at]);
             }
         }
         f64::from(sum)

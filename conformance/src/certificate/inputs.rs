@@ -135,10 +135,11 @@ struct Place {
 /// else one for each way in which they coincide.
 fn places(asset: &Asset, mip: u8, size: u32, axis: usize) -> Vec<Place> {
     let shape = &asset.shape;
+    let (level, mip) = (shape.pyramid.level_of(mip), shape.pyramid.mip_in_level(mip));
     let merged = |texel: u32| {
         [0, 1].map(|grid: usize| {
             let sizes = shape.grids[grid];
-            let (columns, rows) = shape.grid_size(grid);
+            let (columns, rows) = shape.level_size(grid, level);
             let cells = [columns, rows][axis];
             let position = AxisPosition::of(texel, mip, sizes.scale_log2, shape.snap);
             let [first, second] = position.corners(cells, shape.address_mode);

@@ -143,11 +143,16 @@ pub fn witness(asset: &Asset) -> Option<Witness> {
     for grid in 0..2 {
         let sizes = parts.shape.grids[grid];
         let channels = usize::from(sizes.channels);
-        let (columns, rows) = parts.shape.grid_size(grid);
         let request = class.request;
+        let pyramid = asset.shape.pyramid;
+        let (level, mip) = (
+            pyramid.level_of(request.mip()),
+            pyramid.mip_in_level(request.mip()),
+        );
+        let (columns, rows) = asset.shape.level_size(grid, level);
+        let base = asset.shape.level_base(grid, level) as usize;
         let axis = |texel, cells| {
-            let position =
-                AxisPosition::of(texel, request.mip(), sizes.scale_log2, asset.shape.snap);
+            let position = AxisPosition::of(texel, mip, sizes.scale_log2, asset.shape.snap);
             position.corners(cells, asset.shape.address_mode)
         };
         let (x, y) = (axis(request.x(), columns), axis(request.y(), rows));
@@ -163,7 +168,7 @@ pub fn witness(asset: &Asset) -> Option<Witness> {
                 for (right, below) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
                     let cell = y[below] as usize * columns as usize + x[right] as usize;
                     for channel in 0..channels {
-                        parts.grids[grid][cell * channels + channel] = code(lane);
+                        parts.grids[grid][base + cell * channels + channel] = code(lane);
                         lane += 1;
                     }
                 }

@@ -171,19 +171,34 @@ impl Run<'_> {
     fn corners(&mut self, grid: usize) -> (Vec<i128>, [i128; 2]) {
         let shape = &self.asset.shape;
         let sizes = shape.grids[grid];
-        let cells = [shape.width, shape.height].map(|texels| {
-            let cell = power(u32::from(sizes.scale_log2));
-            (i128::from(texels) + cell - 1) / cell
-        });
+        let mip = u32::from(self.request.mip());
+        let (first, each) = (shape.pyramid.first(), shape.pyramid.each());
+        let (first, each) = (u32::from(first), u32::from(each));
+        let level = match mip.checked_sub(first) {
+            Some(beyond) if each > 0 => 1 + beyond / each,
+            Some(_) | None => 0,
+        };
+        // A level is a grid of its own scale.
+        let scale = |level| u32::from(sizes.scale_log2) + level * each;
+        let cells_of = |level| {
+            [shape.width, shape.height].map(|texels| {
+                let cell = power(scale(level));
+                (i128::from(texels) + cell - 1) / cell
+            })
+        };
+        let before: i128 = (0..level)
+            .map(|level| cells_of(level).iter().product::<i128>())
+            .sum();
+        let cells = cells_of(level);
         let [x, y] = [(self.request.x(), cells[0]), (self.request.y(), cells[1])]
-            .map(|(texel, cells)| self.axis(texel, u32::from(sizes.scale_log2), cells));
+            .map(|(texel, cells)| self.axis(texel, scale(level), cells));
         let corners = [(0, 0), (1, 0), (0, 1), (1, 1)]
             .map(|(right, below): (usize, usize)| (x.cells[right], y.cells[below]));
         let channels = usize::from(sizes.channels);
         let codes: Vec<i128> = corners
             .iter()
             .flat_map(|(column, row)| {
-                let cell = (row * cells[0] + column) as usize;
+                let cell = (before + row * cells[0] + column) as usize;
                 &self.asset.grids[grid][cell * channels..(cell + 1) * channels]
             })
             .map(|&code| i128::from(code))

@@ -5,7 +5,7 @@
 //! concatenated and which interpolated, and the form of the waves, is the asset's.
 
 use super::number::signed;
-use super::position::RealAxis;
+use super::position::{RealAxis, RealLevel};
 use ntmu_isa::embed::Wave;
 use ntmu_isa::filter::FilterRule;
 use ntmu_isa::profile::Profile;
@@ -15,7 +15,7 @@ use ntmu_model::Request;
 /// All inputs of a texel: both grids, the waves, the level, zeros; in units of 1/2^(A−1) for
 /// inputs of A bits, clamped to A bits.
 ///
-/// `grids` are the codes as an asset keeps them: rows of cells, cells of channels. Of the profile
+/// `grids` are the codes as an asset keeps them: levels of rows of cells, cells of channels. Of the profile
 /// only the meaning of a fraction is taken, see [`fraction`].
 #[must_use]
 pub fn inputs(
@@ -49,7 +49,7 @@ pub fn inputs(
         .collect()
 }
 
-/// The four corners around a texel centre in one grid.
+/// The four corners around a texel centre in one grid, of the level that serves its mip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Square {
     /// From the first towards the second corner, along x and y: sixteenths.
@@ -62,8 +62,10 @@ impl Square {
     /// The corners of a texel.
     #[must_use]
     pub fn of(shape: &Shape, grids: &[Vec<u8>; 2], grid: usize, request: Request) -> Square {
-        let scale = shape.grids[grid].scale_log2;
-        let (cells_x, cells_y) = shape.grid_size(grid);
+        let level = RealLevel::of(shape.pyramid, request.mip());
+        let scale = level.scale_log2(shape, grid);
+        let [cells_x, cells_y] = level.cells(shape, grid);
+        let base = level.base(shape, grid);
         let x = RealAxis::of(request.x(), request.mip(), scale, shape.snap);
         let y = RealAxis::of(request.y(), request.mip(), scale, shape.snap);
         let columns = x.cells(cells_x, shape.address_mode);
@@ -71,7 +73,7 @@ impl Square {
         let channels = usize::from(shape.grids[grid].channels);
         let bits = shape.grids[grid].format.bits();
         let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, below): (usize, usize)| {
-            let cell = rows[below] as usize * cells_x as usize + columns[right] as usize;
+            let cell = base + rows[below] as usize * cells_x as usize + columns[right] as usize;
             let codes = &grids[grid][cell * channels..(cell + 1) * channels];
             codes.iter().map(|&code| latent(code, bits)).collect()
         });

@@ -4,6 +4,60 @@
 //! DESIGN, "grid position": texel centres, `g = (texel + ½)·2^mip / 2^scale − ½`.
 
 use ntmu_isa::position::{AddressMode, CornerSnap};
+use ntmu_isa::pyramid::Pyramid;
+use ntmu_isa::shape::Shape;
+
+/// A level of a pyramid: a grid of its own, of a coarser scale.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RealLevel {
+    /// 0 for the largest.
+    pub level: u8,
+    /// Halvings between level 0 and this one.
+    pub halvings: u8,
+}
+
+impl RealLevel {
+    /// The level that serves a mip: level 0 the first mips, every further one the next few.
+    #[must_use]
+    pub fn of(pyramid: Pyramid, mip: u8) -> RealLevel {
+        let (mut level, mut served) = (0, pyramid.first());
+        // Of a single level nothing is counted: it serves them all.
+        while pyramid.each() > 0 && mip >= served {
+            level += 1;
+            served += pyramid.each();
+        }
+        RealLevel {
+            level,
+            halvings: level * pyramid.each(),
+        }
+    }
+
+    /// log2 of mip 0's resolution over that of the level of a grid.
+    #[must_use]
+    pub fn scale_log2(self, shape: &Shape, grid: usize) -> u8 {
+        shape.grids[grid].scale_log2 + self.halvings
+    }
+
+    /// Cells along x and y of the level of a grid: as many as cover mip 0.
+    #[must_use]
+    pub fn cells(self, shape: &Shape, grid: usize) -> [u32; 2] {
+        let cell_size = 2_f64.powi(i32::from(self.scale_log2(shape, grid)));
+        [shape.width, shape.height].map(|texels| (f64::from(texels) / cell_size).ceil() as u32)
+    }
+
+    /// Cells of a grid before those of the level.
+    #[must_use]
+    pub fn base(self, shape: &Shape, grid: usize) -> usize {
+        let before = (0..self.level).map(|level| RealLevel {
+            level,
+            halvings: level * shape.pyramid.each(),
+        });
+        before
+            .map(|level| level.cells(shape, grid).map(|cells| cells as usize))
+            .map(|[x, y]| x * y)
+            .sum()
+    }
+}
 
 /// One axis of the square of corners around a texel centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +73,8 @@ pub struct RealAxis {
 }
 
 impl RealAxis {
-    /// The position of texel `texel` of mip `mip` in a grid at 1/2^`scale_log2` of the resolution.
+    /// The position of texel `texel` of mip `mip` in a grid, or in a level of one, at
+    /// 1/2^`scale_log2` of mip 0's resolution.
     #[must_use]
     pub fn of(texel: u32, mip: u8, scale_log2: u8, snap: CornerSnap) -> RealAxis {
         let texel_size = 2_f64.powi(i32::from(mip));

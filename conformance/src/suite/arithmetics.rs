@@ -20,7 +20,7 @@ pub(super) fn subjects() -> Vec<Subject> {
     subjects
 }
 
-fn subject(
+pub(super) fn subject(
     name: &'static str,
     comment: &'static str,
     flags: &'static [Flag],

@@ -3,8 +3,10 @@
 mod arithmetics;
 pub mod container;
 pub mod position;
+mod pyramids;
 pub mod refuse;
 mod refuse_layers;
+mod refuse_pyramid;
 pub mod rescale;
 mod subjects;
 pub mod texel;

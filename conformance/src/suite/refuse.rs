@@ -1,13 +1,15 @@
-//! The refuse suite: bytes that are no asset, and three that are.
+//! The refuse suite: bytes that are no asset, and a few that are.
 
 use super::SuiteError;
 use super::container::{Container, seal};
 use super::refuse_layers::{half_fields, layer_fields};
+use super::refuse_pyramid::pyramid_fields;
 use crate::emit::Builder;
 use crate::flag::{self, Flag};
 use crate::synthetic::{self, Spec, corners, interpolated};
 use crate::vector::{Answer, OpenQuery, Query, VectorFile};
 use ntmu_isa::Asset;
+use ntmu_isa::format::VERSION;
 
 /// Every so many bytes, one bit is flipped; prime, so that all bit positions occur.
 const FLIP_STEP: usize = 11;
@@ -50,11 +52,12 @@ pub fn suite() -> Result<VectorFile, SuiteError> {
         );
         half_fields(&mut builder, &container, &halves);
     }
+    pyramid_fields(&mut builder, &container)?;
     Ok(builder.build())
 }
 
 /// A small asset: three layers, the second with a skip path.
-fn asset(mut spec: Spec) -> Result<Asset, SuiteError> {
+pub(super) fn asset(mut spec: Spec) -> Result<Asset, SuiteError> {
     spec.shape.grids = [corners(1, 3, 3), interpolated(1, 4, 3)];
     (spec.hidden, spec.block_span) = (vec![2], 1);
     synthetic::asset(&spec, 1).map_err(|error| SuiteError::Asset {
@@ -67,7 +70,7 @@ fn asset_of_halves() -> Result<Asset, SuiteError> {
     asset(Spec::small(8, 8).with_halves())
 }
 
-fn accepted(builder: &mut Builder, comment: &str, ntx: Vec<u8>) {
+pub(super) fn accepted(builder: &mut Builder, comment: &str, ntx: Vec<u8>) {
     let request = Query::Open(OpenQuery { ntx });
     builder.exact(comment, &[flag::CONTROL], request, Answer::Accepted(true));
 }
@@ -121,9 +124,13 @@ fn damaged(builder: &mut Builder, file: &[u8]) {
         seal(&mut foreign);
         builder.refused(comment, &[flag::MAGIC], foreign);
     }
-    for (at, comment) in [(8, "a newer major version"), (10, "a newer minor version")] {
+    let (major, minor) = VERSION;
+    for (at, version, comment) in [
+        (8, major, "a newer major version"),
+        (10, minor, "a newer minor version"),
+    ] {
         let mut newer = file.to_vec();
-        newer[at] += 1;
+        newer[at..at + 2].copy_from_slice(&(version + 1).to_le_bytes());
         seal(&mut newer);
         builder.refused(comment, &[flag::VERSION], newer);
     }

@@ -254,5 +254,6 @@ pub(super) fn subjects() -> Vec<Subject> {
     narrow.spec.scale = SpecScale::BelowTies;
     subjects.push(narrow);
     subjects.extend(super::arithmetics::subjects());
+    subjects.extend(super::pyramids::subjects());
     subjects
 }

@@ -54,22 +54,22 @@ fn decode(builder: &mut Builder, subject: &Subject, asset: &Asset) {
         let request = place.request;
         let taps = decoder.taps(request);
         let is_seam = taps.grids.iter().zip([0, 1]).any(|(tap, grid)| {
-            let (width, height) = asset.shape.grid_size(grid);
+            let (width, height) = asset.shape.level_size(grid, tap.corners.level);
             [(tap.corners.x, width), (tap.corners.y, height)]
                 .iter()
                 .any(|(axis, cells)| {
                     axis.first < 0 || axis.first + axis.stride as i32 >= *cells as i32
                 })
         });
-        let is_deep = asset
-            .shape
-            .grids
-            .iter()
-            .any(|grid| request.mip() > grid.scale_log2);
+        let mip_in_level = asset.shape.pyramid.mip_in_level(request.mip());
+        let grids = &asset.shape.grids;
+        let is_deep = grids.iter().any(|grid| mip_in_level > grid.scale_log2);
+        let is_coarse = asset.shape.pyramid.level_of(request.mip()) > 0;
         let mut flags = subject.flags.to_vec();
         flags.extend(place.flag);
         flags.extend(is_seam.then_some(flag::SEAM));
         flags.extend(is_deep.then_some(flag::DEEP_MIP));
+        flags.extend(is_coarse.then_some(flag::COARSE_LEVEL));
         let overflows = naive::texel(asset, request).overflows;
         flags.extend((!overflows.is_empty()).then_some(flag::OVERFLOW));
         if flags.is_empty() {

@@ -7,8 +7,8 @@ use ntmu_isa::embed::Wave;
 use ntmu_isa::filter::FilterRule;
 use ntmu_isa::half::SumOrder;
 use ntmu_isa::position::{AddressMode, CornerSnap};
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::{PointSnap, Profile};
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::rescale::Requantizer;
 use ntmu_isa::round::Rounding;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
@@ -30,7 +30,7 @@ pub fn arbitrary_spec(seed: u64) -> Spec {
     let r = &mut random;
     let layers = r.within(0, 3);
     Spec {
-        shape: shape(r),
+        shape: shape(r, seed),
         profile: profile(r),
         kinds: kinds(r),
         hidden: (0..layers).map(|_| r.within(1, 17) as u16).collect(),
@@ -57,7 +57,7 @@ pub fn arbitrary_spec(seed: u64) -> Spec {
     }
 }
 
-fn shape(r: &mut Random) -> Shape {
+fn shape(r: &mut Random, seed: u64) -> Shape {
     let (width, height) = (r.choose(&SIZES), r.choose(&SIZES));
     let longest = i32::from(Shape::max_mip_count(width, height));
     let mip_count = if r.within(0, 3) == 0 {
@@ -74,6 +74,7 @@ fn shape(r: &mut Random) -> Shape {
     };
     let grids = [grid(6), grid(8)];
     let channels = r.within(1, 9);
+    let pyramid = pyramid(seed);
     Shape {
         width,
         height,
@@ -88,12 +89,22 @@ fn shape(r: &mut Random) -> Shape {
         input_bits: usual_or(r, 8, 4, 16),
         snap: r.choose(&CornerSnap::ALL),
         address_mode: r.choose(&AddressMode::ALL),
-        pyramid: Pyramid::SINGLE,
+        pyramid,
         grids,
         outputs: (0..channels)
             .map(|_| r.choose(&OutputFormat::ALL))
             .collect(),
     }
+}
+
+/// Every second time a single level, else any pyramid whose second level the longest chain reaches.
+/// From numbers of its own, so that what else a seed stands for does not depend on it.
+fn pyramid(seed: u64) -> Pyramid {
+    let mut random = Random::new(seed ^ 0x7079_7261);
+    let first = random.within(1, 6);
+    let each = random.within(1, first);
+    let several = Pyramid::new(first as u8, each as u8).unwrap_or(Pyramid::SINGLE);
+    random.choose(&[Pyramid::SINGLE, several])
 }
 
 fn profile(r: &mut Random) -> Profile {

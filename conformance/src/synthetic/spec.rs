@@ -3,8 +3,8 @@
 use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::position::{AddressMode, CornerSnap};
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 
 /// The activation of a synthetic asset's hidden layers.

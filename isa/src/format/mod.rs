@@ -14,14 +14,21 @@
 //!         60  u32 CRC-32 of bytes 0..60
 //! table   64  per section: 4 letters, u32 CRC-32, u64 offset, u64 length, u64 zero
 //! SHAP        sizes and sampling          PROF  profile
-//! GRD0 GRD1   codes, B bits each, from the least significant bit of the first byte;
-//!             rows of cells, cells of channels; the last byte is filled with zeros
+//! GRD0 GRD1   codes, B bits each, from the least significant bit of the first byte; levels,
+//!             level 0 first, of rows of cells, of channels; the last byte is filled with zeros
 //! WGTS        layers                      META  names and training record
 //! ```
 //!
 //! **Promise.** A reader accepts every file of its major version that is not newer than itself.
 //! Within a major version bits never change their meaning; a minor version only adds. A section
 //! whose first letter is lower case may be skipped by whoever does not know it.
+//!
+//! | version | what it added | a file of the version before has |
+//! |---|---|---|
+//! | 2.0 | | |
+//! | 2.1 | [the pyramid](crate::pyramid) in `SHAP`, and with it levels of the grids | a zero there: a single level |
+//!
+//! A file carries the smallest version that has what is in it: without a pyramid 2.0.
 
 mod bits;
 mod cursor;
@@ -30,12 +37,15 @@ mod sections;
 
 use crate::asset::{Asset, Parts};
 use crate::error::AssetError;
+use crate::pyramid::Pyramid;
 use cursor::Cursor;
 
 /// The first eight bytes. As in PNG, they show a transfer that changed line ends or lost a bit.
 pub const MAGIC: [u8; 8] = [0x89, b'N', b'T', b'X', 0x0d, 0x0a, 0x1a, 0x0a];
-/// The major and minor version that this crate writes.
-pub const VERSION: (u16, u16) = (2, 0);
+/// The newest major and minor version that this crate reads and writes.
+pub const VERSION: (u16, u16) = (2, 1);
+/// The version of a file without a pyramid.
+const WITHOUT_PYRAMID: (u16, u16) = (2, 0);
 
 const HEADER_BYTES: usize = 64;
 const ENTRY_BYTES: usize = 32;
@@ -45,6 +55,16 @@ const MAX_SECTIONS: u32 = 64;
 const KINDS: [&[u8; 4]; 6] = [b"SHAP", b"PROF", b"GRD0", b"GRD1", b"WGTS", b"META"];
 
 impl Asset {
+    /// The version of the asset's file: the smallest that has what is in it.
+    #[must_use]
+    pub fn version(&self) -> (u16, u16) {
+        if self.shape.pyramid == Pyramid::SINGLE {
+            WITHOUT_PYRAMID
+        } else {
+            VERSION
+        }
+    }
+
     /// The asset as an `.ntx` file. The same asset always gives the same bytes.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
@@ -78,8 +98,9 @@ impl Asset {
         }
         let mut file = Vec::with_capacity(offset);
         file.extend_from_slice(&MAGIC);
-        file.extend_from_slice(&VERSION.0.to_le_bytes());
-        file.extend_from_slice(&VERSION.1.to_le_bytes());
+        let (major, minor) = self.version();
+        file.extend_from_slice(&major.to_le_bytes());
+        file.extend_from_slice(&minor.to_le_bytes());
         file.extend_from_slice(&(KINDS.len() as u32).to_le_bytes());
         file.extend_from_slice(&(offset as u64).to_le_bytes());
         file.extend_from_slice(&crc32fast::hash(&table).to_le_bytes());
@@ -99,9 +120,15 @@ impl Asset {
     /// # Errors
     /// Any byte string that is not an asset: see [`AssetError`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Asset, AssetError> {
-        let bodies = read_sections(bytes)?;
+        let (version, bodies) = read_sections(bytes)?;
         let [shape, profile, grid0, grid1, weights, metadata] = bodies;
         let shape = sections::read_shape(shape)?;
+        if version < VERSION && shape.pyramid != Pyramid::SINGLE {
+            let (major, minor) = version;
+            let allowed = format!("0 in a file of version {major}.{minor}");
+            let code = shape.pyramid.code();
+            return Err(AssetError::field("shape.pyramid", code, allowed));
+        }
         crate::asset::check_shape(&shape)?;
         let grid = |index: usize, body: &[u8]| {
             let name = ["grid0", "grid1"][index];
@@ -120,7 +147,10 @@ impl Asset {
 }
 
 /// The bodies of the six sections, in the order of [`KINDS`].
-fn read_sections(bytes: &[u8]) -> Result<[&[u8]; 6], AssetError> {
+type Bodies<'a> = [&'a [u8]; 6];
+
+/// The version, and the bodies.
+fn read_sections(bytes: &[u8]) -> Result<((u16, u16), Bodies<'_>), AssetError> {
     if bytes.len() < MAGIC.len() || bytes[..MAGIC.len()] != MAGIC {
         let found = bytes[..bytes.len().min(MAGIC.len())].to_vec();
         return Err(AssetError::Foreign {
@@ -165,10 +195,10 @@ fn read_sections(bytes: &[u8]) -> Result<[&[u8]; 6], AssetError> {
     let mut table = Cursor::new("table", &bytes[HEADER_BYTES..]);
     let entries = table.take(section_count as usize * ENTRY_BYTES)?;
     check_crc("table", table_crc, entries)?;
-    collect_sections(bytes, entries)
+    Ok((version, collect_sections(bytes, entries)?))
 }
 
-fn collect_sections<'a>(bytes: &'a [u8], entries: &[u8]) -> Result<[&'a [u8]; 6], AssetError> {
+fn collect_sections<'a>(bytes: &'a [u8], entries: &[u8]) -> Result<Bodies<'a>, AssetError> {
     let mut found: [Option<&[u8]>; 6] = [None; 6];
     let mut end = HEADER_BYTES + entries.len();
     for entry in entries.chunks_exact(ENTRY_BYTES) {

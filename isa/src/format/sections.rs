@@ -75,7 +75,7 @@ pub(super) fn read_shape(body: &[u8]) -> Result<Shape, AssetError> {
     )?;
     let code = cursor.u8()?;
     let pyramid = Pyramid::from_code(code).ok_or_else(|| {
-        let allowed = "0, or 16·first + each with 1 ≤ each ≤ first";
+        let allowed = "0, or 16·first + each with 1 ≤ each ≤ first ≤ 15";
         AssetError::field("shape.pyramid", code, allowed)
     })?;
     let mut grid = |index: usize| -> Result<GridShape, AssetError> {

@@ -159,7 +159,7 @@ macro_rules! instructions {
 }
 
 instructions! {
-    /// Grid position of the request's texel in a grid: first corner, stride and phase per axis.
+    /// Grid position of the request's texel, in the level of a grid that serves its mip: first corner, stride and phase per axis.
     Position = 0x01 "position" Position {
         /// The grid.
         grid: Grid [8..9],

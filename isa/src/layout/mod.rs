@@ -16,7 +16,9 @@
 //! | `+planar` | a plane for each channel, of codes padded to 1, 2, 4 or 8 bits; grid 1 after grid 0 |
 //! | `+together` | the cell of grid 0, then the cell of grid 1 at the same place, in one record |
 //!
-//! A tile's side is 2, 4, 8 or 16 cells. Grids and planes start at multiples of [`BASE_ALIGNMENT`].
+//! A tile's side is 2, 4, 8 or 16 cells. The levels of a grid's [pyramid](crate::pyramid) are laid out
+//! each on its own, level 0 first; in records a level holds the cells of both grids. Grids, levels and
+//! planes start at multiples of [`BASE_ALIGNMENT`].
 //! There is no `+planar+together`: where each channel is a plane of its own, no record is left to share.
 //!
 //! Addresses are counted in steps of a generator too, see [`Layout::address_steps`].
@@ -30,8 +32,9 @@ pub use order::{Inside, Order, Side};
 
 use crate::shape::Shape;
 
-/// Alignment of the first byte of a grid and of a plane: the largest cache line that a unit may have.
-/// So no line holds bytes of two grids, unless they are stored together, or of two planes.
+/// Alignment of the first byte of a grid, of a level and of a plane: the largest cache line that a unit
+/// may have. So no line holds bytes of two grids, unless they are stored together, of two levels, or
+/// of two planes.
 pub const BASE_ALIGNMENT: u64 = 256;
 
 /// What lies next to what: channels of a cell, cells of two grids.
@@ -104,115 +107,146 @@ impl Layout {
         }
     }
 
-    /// From a cell's part in one plane to its part in the next, in bytes; 0 where there are no
-    /// planes.
+    /// From a cell's part in one plane of a level to its part in the next, in bytes; 0 where there
+    /// are no planes.
     #[must_use]
-    pub const fn plane_bytes(self, shape: &Shape, grid: usize) -> u64 {
+    pub const fn plane_bytes(self, shape: &Shape, grid: usize, level: u8) -> u64 {
         match self.storage {
             Storage::Interleaved | Storage::Together => 0,
-            Storage::Planar => (self.cells(shape, grid) * plane_bits(shape, grid))
+            Storage::Planar => (self.cells(shape, grid, level) * plane_bits(shape, grid))
                 .div_ceil(8)
                 .next_multiple_of(BASE_ALIGNMENT),
         }
     }
 
-    /// Bytes of a grid, padding included; of records, the grid's part.
+    /// Bytes of a level of a grid, padding included; of records, the grid's part.
     #[must_use]
-    pub const fn grid_bytes(self, shape: &Shape, grid: usize) -> u64 {
+    pub const fn level_bytes(self, shape: &Shape, grid: usize, level: u8) -> u64 {
         match self.storage {
             Storage::Interleaved | Storage::Together => {
-                self.cells(shape, grid) * self.cell_bytes(shape, grid)
+                self.cells(shape, grid, level) * self.cell_bytes(shape, grid)
             }
-            Storage::Planar => self.planes(shape, grid) as u64 * self.plane_bytes(shape, grid),
+            Storage::Planar => {
+                self.planes(shape, grid) as u64 * self.plane_bytes(shape, grid, level)
+            }
         }
     }
 
-    /// The address of a grid's first byte.
+    /// The address of the first byte of a level of a grid.
     #[must_use]
-    pub const fn base(self, shape: &Shape, grid: usize) -> u64 {
-        if grid == 0 {
-            return 0;
-        }
-        match self.storage {
+    pub const fn base(self, shape: &Shape, grid: usize, level: u8) -> u64 {
+        let start = match self.storage {
+            Storage::Interleaved | Storage::Planar if grid == 0 => 0,
             Storage::Interleaved | Storage::Planar => {
-                self.grid_bytes(shape, 0).next_multiple_of(BASE_ALIGNMENT)
+                self.span(shape, 0).next_multiple_of(BASE_ALIGNMENT)
             }
+            Storage::Together if grid == 0 => 0,
             Storage::Together => self.cell_bytes(shape, 0),
-        }
+        };
+        start + self.before(shape, grid, level)
     }
 
     /// Bytes of both grids in memory.
     #[must_use]
     pub const fn total_bytes(self, shape: &Shape) -> u64 {
         match self.storage {
-            Storage::Interleaved | Storage::Planar => {
-                self.base(shape, 1) + self.grid_bytes(shape, 1)
-            }
-            Storage::Together => self.grid_bytes(shape, 0) + self.grid_bytes(shape, 1),
+            Storage::Interleaved | Storage::Planar => self.base(shape, 1, 0) + self.span(shape, 1),
+            Storage::Together => self.span(shape, 0),
         }
     }
 
-    /// The address of a cell's first byte, in its first plane. The cell lies within the grid.
+    /// The address of the first byte of a cell of a level of a grid, in its first plane. The cell lies
+    /// within the level.
     #[must_use]
-    pub const fn address(self, shape: &Shape, grid: usize, x: u32, y: u32) -> u64 {
-        self.first_bit(shape, grid, x, y, 0) / 8
+    pub const fn address(self, shape: &Shape, grid: usize, level: u8, x: u32, y: u32) -> u64 {
+        self.first_bit(shape, grid, level, x, y, 0) / 8
     }
 
     /// The first bit of a code in memory: bit `n % 8`, from the least significant, of byte `n / 8`. The
-    /// code's other bits follow. The cell lies within the grid.
+    /// code's other bits follow. The cell lies within the level of the grid.
     #[must_use]
     pub const fn first_bit(
         self,
         shape: &Shape,
         grid: usize,
+        level: u8,
         x: u32,
         y: u32,
         channel: usize,
     ) -> u64 {
-        let (width, height) = self.size(shape, grid);
+        let (width, height) = self.size(shape, grid, level);
         let index = self.order.index(width, height, x, y);
         let channel = channel as u64;
         let bits = shape.grids[grid].format.bits() as u64;
         let within = match self.storage {
             Storage::Interleaved => 8 * index * self.cell_bytes(shape, grid) + channel * bits,
             Storage::Planar => {
-                8 * channel * self.plane_bytes(shape, grid) + index * plane_bits(shape, grid)
+                8 * channel * self.plane_bytes(shape, grid, level) + index * plane_bits(shape, grid)
             }
             Storage::Together => {
                 let record = self.cell_bytes(shape, 0) + self.cell_bytes(shape, 1);
                 8 * index * record + channel * bits
             }
         };
-        8 * self.base(shape, grid) + within
+        8 * self.base(shape, grid, level) + within
     }
 
     /// Multiply-add steps of an address generator for one corner, all planes.
     ///
     /// Wires are free, so taking the bits of x and y apart and joining them costs nothing; sizes and
-    /// bases are registers, written when an asset is bound. What is left is counted: the index of the
-    /// tile, row times tiles in a row plus column ([`Order::steps`]); the base plus the index times
-    /// the bytes of a cell or record; and for each plane after the first one addition of the plane's
-    /// bytes. A factor that happens to be one or a power of two saves nothing: the generator serves
-    /// every asset.
+    /// bases are registers, a set for each level, written when an asset is bound. What is left is
+    /// counted: the index of the tile, row times tiles in a row plus column ([`Order::steps`]); the base
+    /// plus the index times the bytes of a cell or record; and for each plane after the first one
+    /// addition of the plane's bytes. A factor that happens to be one or a power of two saves nothing:
+    /// the generator serves every asset.
     #[must_use]
     pub const fn address_steps(self, shape: &Shape, grid: usize) -> u32 {
         self.order.steps() + self.planes(shape, grid)
     }
 
-    /// Cells along x and y that the order runs over.
-    const fn size(self, shape: &Shape, grid: usize) -> (u32, u32) {
+    /// Bytes from a grid's first level to the end of its last, without padding after it; of records,
+    /// those of both grids.
+    const fn span(self, shape: &Shape, grid: usize) -> u64 {
+        let last = shape.level_count() - 1;
+        self.before(shape, grid, last) + self.stored(shape, grid, last)
+    }
+
+    /// Bytes from a grid's first level to one of its levels.
+    const fn before(self, shape: &Shape, grid: usize, level: u8) -> u64 {
+        let (mut bytes, mut before) = (0, 0);
+        while before < level {
+            bytes += self
+                .stored(shape, grid, before)
+                .next_multiple_of(BASE_ALIGNMENT);
+            before += 1;
+        }
+        bytes
+    }
+
+    /// Bytes of a level of a grid, or of the records of a level.
+    const fn stored(self, shape: &Shape, grid: usize, level: u8) -> u64 {
         match self.storage {
-            Storage::Interleaved | Storage::Planar => shape.grid_size(grid),
+            Storage::Interleaved | Storage::Planar => self.level_bytes(shape, grid, level),
             Storage::Together => {
-                let ((w0, h0), (w1, h1)) = (shape.grid_size(0), shape.grid_size(1));
+                self.level_bytes(shape, 0, level) + self.level_bytes(shape, 1, level)
+            }
+        }
+    }
+
+    /// Cells along x and y that the order runs over.
+    const fn size(self, shape: &Shape, grid: usize, level: u8) -> (u32, u32) {
+        match self.storage {
+            Storage::Interleaved | Storage::Planar => shape.level_size(grid, level),
+            Storage::Together => {
+                let ((w0, h0), (w1, h1)) = (shape.level_size(0, level), shape.level_size(1, level));
                 (if w0 > w1 { w0 } else { w1 }, if h0 > h1 { h0 } else { h1 })
             }
         }
     }
 
     /// Cells that the order takes, padding included.
-    const fn cells(self, shape: &Shape, grid: usize) -> u64 {
-        let (width, height) = self.size(shape, grid);
+    const fn cells(self, shape: &Shape, grid: usize, level: u8) -> u64 {
+        let (width, height) = self.size(shape, grid, level);
         self.order.cells(width, height)
     }
 }

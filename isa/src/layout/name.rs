@@ -156,6 +156,7 @@ impl Layout {
     /// # Errors
     /// [`Storage::Together`] where the grids differ in size.
     pub fn check(self, shape: &Shape) -> Result<(), LayoutError> {
+        // Where level 0 of both has one size, every level has.
         let found = [shape.grid_size(0), shape.grid_size(1)];
         match self.storage {
             Storage::Together if found[0] != found[1] => Err(LayoutError::Sizes {

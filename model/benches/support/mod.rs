@@ -8,8 +8,8 @@ use ntmu_isa::half::Half;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Skip};
 use ntmu_isa::position::{AddressMode, CornerSnap};
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 

@@ -4,6 +4,7 @@
 
 use super::kernel::Kernels;
 use super::lane::{Fold, Lane};
+use super::region::Region;
 use crate::place::Place;
 use ntmu_isa::Asset;
 use ntmu_isa::embed::{
@@ -43,7 +44,7 @@ pub(super) struct Embed<L> {
     /// Per grid, the input of every code.
     corners: [Box<[L; 256]>; 2],
     lerps: [Lerp; 2],
-    /// Per mip, of the waves and the level.
+    /// Per mip, of the waves and the level, and where its latents lie.
     mips: Vec<MipTable<L>>,
     inputs: usize,
 }
@@ -54,6 +55,7 @@ struct MipTable<L> {
     /// \[y\]\[x\]\[wave\], both modulo [`TILE_TEXELS`].
     waves: [[[L; MOST_WAVES]; TILE_TEXELS as usize]; TILE_TEXELS as usize],
     level: L,
+    grids: [Region; 2],
 }
 
 /// The positions of a run of columns or rows, per grid.
@@ -105,11 +107,17 @@ impl<L: Lane> Embed<L> {
     ) {
         let mut rest = lanes;
         for grid in [0, 1] {
-            let (width, height) = asset.shape.grid_size(grid);
+            let region = self.region(grid, mip);
             let axes =
-                [(x, width), (y, height)].map(|(texel, size)| axis(asset, grid, texel, mip, size));
+                [(x, 0), (y, 1)].map(|(texel, along)| axis(asset, grid, region, texel, along));
             let (own, after) = rest.split_at_mut(grid_inputs(asset, grid));
-            self.grid(asset, kernels, grid, corners(asset, grid, axes), own);
+            self.grid(
+                asset,
+                kernels,
+                grid,
+                corners(asset, grid, region, axes),
+                own,
+            );
             rest = after;
         }
         self.after_grids(asset, (x, y, mip), rest);
@@ -121,16 +129,17 @@ impl<L: Lane> Embed<L> {
         let (bits, mip, phase_bits) = (place.bits(), place.mip(), profile.subtexel_bits);
         let mut rest = lanes;
         for (index, grid) in shape.grids.iter().enumerate() {
-            let (width, height) = shape.grid_size(index);
+            let region = self.region(index, mip);
+            let [width, height] = region.size;
             let axes = [(place.x(), width), (place.y(), height)].map(|(coordinate, size)| {
-                let scale = grid.scale_log2;
-                let at = AxisPosition::at(coordinate, bits, mip, scale, shape.snap, phase_bits);
+                let (scale, mip, snap) = (grid.scale_log2, region.mip, shape.snap);
+                let at = AxisPosition::at(coordinate, bits, mip, scale, snap, phase_bits);
                 let cells = at.corners(size, shape.address_mode);
                 let phase = at.phase;
                 Axis { cells, phase }
             });
             let (own, after) = rest.split_at_mut(grid_inputs(asset, index));
-            let corners = corners(asset, index, axes);
+            let corners = corners(asset, index, region, axes);
             match grid.sampling {
                 Sampling::Corners => self.concat(index, corners, own),
                 Sampling::Interpolated => {
@@ -167,6 +176,7 @@ impl<L: Lane> Embed<L> {
         (at, count): (usize, usize),
         output: &mut [L::Group],
     ) {
+        let regions = [0, 1].map(|grid| self.region(grid, mip));
         // Corners of grid 0 fill whole groups, which all texels of a cell share.
         let shared = match asset.shape.grids[0].sampling {
             Sampling::Corners => grid_inputs(asset, 0),
@@ -178,7 +188,7 @@ impl<L: Lane> Embed<L> {
             let mut lanes = [L::ZERO; 4 * MAX_GRID_CHANNELS as usize];
             let lanes = &mut lanes[..shared];
             for (from, length, positions) in runs(axes, 0, (x, y), count) {
-                self.concat(0, corners(asset, 0, positions), lanes);
+                self.concat(0, corners(asset, 0, regions[0], positions), lanes);
                 L::fill(first, at + from, length, lanes);
             }
         }
@@ -188,11 +198,12 @@ impl<L: Lane> Embed<L> {
         let second = own..own + grid_inputs(asset, 1);
         let row = axes.1.at(0, y);
         for (from, length, positions) in runs(axes, 1, (x, y), count) {
-            let mut around = corners(asset, 1, positions);
+            let mut around = corners(asset, 1, regions[1], positions);
             for texel in from..from + length {
                 let column = x + texel as u32;
                 if own > 0 {
-                    let corners = corners(asset, 0, [axes.0.at(0, column), row]);
+                    let axes = [axes.0.at(0, column), row];
+                    let corners = corners(asset, 0, regions[0], axes);
                     self.grid(asset, kernels, 0, corners, &mut lanes[..own]);
                 }
                 around.phases[0] = axes.0.at(1, column).phase;
@@ -207,6 +218,10 @@ impl<L: Lane> Embed<L> {
                 L::put(rest, at + texel, lanes);
             }
         }
+    }
+
+    fn region(&self, grid: usize, mip: u8) -> Region {
+        self.mips[usize::from(mip)].grids[grid]
     }
 
     /// The inputs that a grid gives.
@@ -306,10 +321,9 @@ impl Axes {
     /// The positions of texels `first..first + count` along an axis of a mip.
     pub(super) fn new(asset: &Asset, is_row: bool, (first, count): (u32, u32), mip: u8) -> Axes {
         let grids = [0, 1].map(|grid: usize| {
-            let (width, height) = asset.shape.grid_size(grid);
-            let size = if is_row { height } else { width };
+            let region = Region::new(asset, grid, mip);
             (first..first + count)
-                .map(|texel| axis(asset, grid, texel, mip, size))
+                .map(|texel| axis(asset, grid, region, texel, usize::from(is_row)))
                 .collect()
         });
         Axes { grids, first }
@@ -320,22 +334,30 @@ impl Axes {
     }
 }
 
-fn axis(asset: &Asset, grid: usize, texel: u32, mip: u8, size: u32) -> Axis {
+/// `along` is 0 for x and 1 for y.
+fn axis(asset: &Asset, grid: usize, region: Region, texel: u32, along: usize) -> Axis {
     let shape = &asset.shape;
     let scale = shape.grids[grid].scale_log2;
-    let position = AxisPosition::of(texel, mip, scale, shape.snap);
+    let position = AxisPosition::of(texel, region.mip, scale, shape.snap);
     Axis {
-        cells: position.corners(size, shape.address_mode),
+        cells: position.corners(region.size[along], shape.address_mode),
         phase: position.phase,
     }
 }
 
 /// The codes of the corners (0,0), (1,0), (0,1), (1,1).
-fn corners(asset: &Asset, grid: usize, [x, y]: [Axis; 2]) -> Corners<'_> {
+fn corners(asset: &Asset, grid: usize, region: Region, [x, y]: [Axis; 2]) -> Corners<'_> {
+    let channels = usize::from(asset.shape.grids[grid].channels);
+    let codes = &asset.grids[grid];
+    let cell = |(column, row): (u32, u32)| {
+        let cell = row as usize * region.size[0] as usize + column as usize;
+        let start = region.base + cell * channels;
+        &codes[start..start + channels]
+    };
     let ([left, right], [top, bottom]) = (x.cells, y.cells);
     let cells = [(left, top), (right, top), (left, bottom), (right, bottom)];
     Corners {
-        cells: cells.map(|(column, row)| asset.cell(grid, column, row)),
+        cells: cells.map(cell),
         phases: [x.phase, y.phase],
     }
 }
@@ -386,6 +408,7 @@ impl<L: Lane> MipTable<L> {
                 std::array::from_fn(|x| std::array::from_fn(|at| wave(x, y, at)))
             }),
             level: L::of(level_input(mip, shape.mip_count, shape.input_bits)),
+            grids: [0, 1].map(|grid| Region::new(asset, grid, mip)),
         }
     }
 }

@@ -20,6 +20,7 @@ pub mod kernel;
 mod lane;
 mod path;
 mod plan;
+mod region;
 mod register;
 mod texel;
 mod tile;

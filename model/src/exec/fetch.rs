@@ -28,8 +28,8 @@ impl<'a> Memory<'a> {
     pub(super) fn codes(&self, grid: usize, corners: &Corners, codes: &mut Vec<u8>) {
         codes.clear();
         for (x, y) in corners.cells() {
-            self.layout
-                .cell(self.shape, &self.image, (grid, x, y), codes);
+            let cell = (corners.level, x, y);
+            self.layout.cell(self.shape, &self.image, grid, cell, codes);
         }
     }
 
@@ -41,12 +41,13 @@ impl<'a> Memory<'a> {
 
 /// Where memory keeps the codes of four corners.
 pub(super) fn addresses(shape: &Shape, layout: Layout, grid: usize, corners: &Corners) -> Fetch {
-    let address = |(x, y)| layout.address(shape, grid, x, y);
+    let level = corners.level;
+    let address = |(x, y)| layout.address(shape, grid, level, x, y);
     Fetch {
         grid: grid as u8,
         addresses: corners.cells().map(address),
         cell_bytes: layout.cell_bytes(shape, grid) as u32,
         planes: layout.planes(shape, grid),
-        plane_bytes: layout.plane_bytes(shape, grid),
+        plane_bytes: layout.plane_bytes(shape, grid, level),
     }
 }

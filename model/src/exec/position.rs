@@ -5,16 +5,18 @@ use ntmu_isa::filter::FilterRule;
 use ntmu_isa::position::{AxisPosition, PHASE_BITS};
 use ntmu_isa::shape::Shape;
 
-/// The square of corners around a place, in one grid.
+/// The square of corners around a place, in the level of one grid that serves the place's mip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Corners {
+    /// The level of the grid.
+    pub level: u8,
     /// First corner, stride and phase along x.
     pub x: AxisPosition,
     /// First corner, stride and phase along y.
     pub y: AxisPosition,
-    /// The columns of the two corners along x, within the grid.
+    /// The columns of the two corners along x, within the level.
     pub columns: [u32; 2],
-    /// The rows of the two corners along y, within the grid.
+    /// The rows of the two corners along y, within the level.
     pub rows: [u32; 2],
 }
 
@@ -28,6 +30,7 @@ impl Default for Corners {
             phase_bits: PHASE_BITS,
         };
         Corners {
+            level: 0,
             x: origin,
             y: origin,
             columns: [0; 2],
@@ -64,13 +67,16 @@ impl Corners {
 /// The corners of a place in a grid, with phases of `phase_bits` bits.
 pub(super) fn corners(shape: &Shape, grid: usize, place: &Place, phase_bits: u8) -> Corners {
     let scale = shape.grids[grid].scale_log2;
+    let level = shape.pyramid.level_of(place.mip());
+    let mip = shape.pyramid.mip_in_level(place.mip());
     let axis = |coordinate| {
-        let (bits, mip) = (place.bits(), place.mip());
+        let bits = place.bits();
         AxisPosition::at(coordinate, bits, mip, scale, shape.snap, phase_bits)
     };
     let (x, y) = (axis(place.x()), axis(place.y()));
-    let (width, height) = shape.grid_size(grid);
+    let (width, height) = shape.level_size(grid, level);
     Corners {
+        level,
         x,
         y,
         columns: x.corners(width, shape.address_mode),

@@ -4,6 +4,7 @@ use crate::fixture::{BYTES, Built, Hidden, Kind, Recipe, Sketch};
 use ntmu_isa::activation::Activation;
 use ntmu_isa::layout::Layout;
 use ntmu_isa::profile::Profile;
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::sampler::{Filter, MipFilter, Order as Turns, Sampler};
 use ntmu_model::control::Order;
@@ -127,8 +128,14 @@ fn hidden() -> impl Strategy<Value = Hidden> {
 fn sketch() -> impl Strategy<Value = Sketch> {
     let hidden = prop::collection::vec((hidden(), any::<bool>()), 0..4);
     let last = prop_oneof![Just(BYTES), Just(Kind::Half)];
-    let sizes = (0..=3_u8, 1..9_u16);
-    (sizes, hidden, last).prop_map(|((octaves, channels), hidden, last)| {
+    let pyramids = prop::sample::select(vec![
+        Pyramid::SINGLE,
+        Pyramid::SINGLE,
+        Pyramid::NTC,
+        Pyramid::EVERY_MIP,
+    ]);
+    let sizes = (0..=3_u8, 1..9_u16, pyramids);
+    (sizes, hidden, last).prop_map(|((octaves, channels, pyramid), hidden, last)| {
         let mut layers: Vec<Hidden> = Vec::new();
         for (mut layer, adds) in hidden {
             if let (Some(before), true) = (layers.last(), adds) {
@@ -145,6 +152,7 @@ fn sketch() -> impl Strategy<Value = Sketch> {
             size: 64,
             // Equal grids, so that every layout is allowed.
             grid_channels: [5, 11],
+            pyramid,
             octaves,
             hidden: layers,
             last,

@@ -8,8 +8,8 @@ use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
 use ntmu_isa::layout::Layout;
 use ntmu_isa::position::{AddressMode, CornerSnap};
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 use ntmu_isa::{Asset, Program};
@@ -46,6 +46,7 @@ pub(crate) struct Hidden {
 pub(crate) struct Sketch {
     pub(crate) size: u32,
     pub(crate) grid_channels: [u16; 2],
+    pub(crate) pyramid: Pyramid,
     pub(crate) octaves: u8,
     pub(crate) hidden: Vec<Hidden>,
     pub(crate) last: Kind,
@@ -64,6 +65,7 @@ impl Sketch {
         Sketch {
             size,
             grid_channels,
+            pyramid: Pyramid::SINGLE,
             octaves: 3,
             hidden: widths.iter().map(hidden).collect(),
             last: BYTES,
@@ -150,12 +152,15 @@ fn parameters(layer: &Hidden, next: Option<Kind>, inputs: u16) -> Parameters {
 }
 
 pub(crate) fn asset(sketch: &Sketch) -> Asset {
-    let shape = shape(
-        sketch.size,
-        sketch.grid_channels,
-        sketch.octaves,
-        sketch.channels,
-    );
+    let shape = Shape {
+        pyramid: sketch.pyramid,
+        ..shape(
+            sketch.size,
+            sketch.grid_channels,
+            sketch.octaves,
+            sketch.channels,
+        )
+    };
     let last = Hidden {
         kind: sketch.last,
         outputs: sketch.channels,

@@ -6,6 +6,7 @@ use ntmu_isa::filter::FilterRule;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::position::{AddressMode, AxisPosition, CornerSnap};
 use ntmu_isa::profile::Profile;
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::round::Rounding;
 
 fn format(bits: u32) -> LatentFormat {
@@ -44,6 +45,19 @@ fn positions_agree_at_every_mip_scale_snap_and_address_mode() {
         let [first, second] = axis.corners(size, mode);
         let phase = i32::from(axis.phase);
         [axis.first, phase, first as i32, second as i32]
+    });
+}
+
+#[test]
+fn levels_agree_in_every_pyramid_at_every_mip() {
+    let pyramids = || (0..=255_u8).filter_map(Pyramid::from_code);
+    let cases: Vec<Case> = pyramids()
+        .flat_map(|pyramid| (0..=14).map(move |mip| [u32::from(pyramid.code()), mip, 0, 0]))
+        .collect();
+    compare("probe_pyramid", &cases, |&[code, mip, _, _]| {
+        let (pyramid, mip) = (Pyramid::from_code(code as u8).unwrap(), mip as u8);
+        let (level, mip) = (pyramid.level_of(mip), pyramid.mip_in_level(mip));
+        [i32::from(level), i32::from(mip), 0, 0]
     });
 }
 

@@ -11,8 +11,8 @@ use ntmu_isa::half::{Half, SumOrder};
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
 use ntmu_isa::position::{AddressMode, CornerSnap};
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::profile::Profile;
+use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::rescale::{Multiplier, Requantizer};
 use ntmu_isa::round::Rounding;
 use ntmu_isa::shape::{GridShape, LaneFormat, OutputFormat, Sampling, Shape};
@@ -137,6 +137,9 @@ impl Recipe {
         shape.input_bits = random.within(4, 16) as u8;
         shape.snap = random.one_of(&CornerSnap::ALL);
         shape.address_mode = random.one_of(&AddressMode::ALL);
+        let first = random.within(1, 6);
+        let several = Pyramid::new(first as u8, random.within(1, first) as u8);
+        shape.pyramid = random.one_of(&[Pyramid::SINGLE, several.unwrap_or(Pyramid::SINGLE)]);
         for grid in &mut shape.grids {
             grid.sampling = random.one_of(&Sampling::ALL);
         }

@@ -57,13 +57,14 @@ pub(crate) fn reference(asset: &Asset, request: (u32, u32, u8)) -> Taps {
 
 fn grid(asset: &Asset, index: usize, (x, y, mip): (u32, u32, u8)) -> GridTap {
     let shape = &asset.shape;
-    let (width, height) = shape.grid_size(index);
+    let (level, mip) = (shape.pyramid.level_of(mip), shape.pyramid.mip_in_level(mip));
+    let (width, height) = shape.level_size(index, level);
     let axis = |t| AxisPosition::of(t, mip, shape.grids[index].scale_log2, shape.snap);
     let columns = axis(x).corners(width, shape.address_mode);
     let rows = axis(y).corners(height, shape.address_mode);
     let codes = rows
         .iter()
-        .flat_map(|&row| columns.map(|column| asset.cell(index, column, row)))
+        .flat_map(|&row| columns.map(|column| asset.cell(index, level, column, row)))
         .flatten()
         .copied()
         .collect();

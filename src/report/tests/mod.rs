@@ -62,8 +62,11 @@ fn figures(psnr: f64, ssim: f64) -> Figures {
 fn study() -> Study {
     let map = MapQuality {
         map: "color".to_owned(),
+        encoding: "srgb",
         mips: vec![figures(34.567, 0.91234), figures(f64::INFINITY, 1.0)],
         overall: figures(35.11, 0.92),
+        angles: None,
+        perceptual: None,
     };
     Study {
         asset: AssetStudy {
@@ -84,6 +87,8 @@ fn study() -> Study {
             maps: vec![map],
             mips: vec![figures(33.33, 0.8765), figures(32.22, 0.8654)],
             overall: figures(31.11, 0.8543),
+            sizes: vec![(8, 4), (4, 2)],
+            masked_share: None,
         }),
         oracle: OracleStudy {
             codes: 786_429,

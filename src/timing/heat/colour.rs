@@ -15,7 +15,7 @@ const VIRIDIS: [[u8; 3]; 10] = [
 ];
 
 /// The colour of a number from 0 to 1.
-pub(super) fn of(value: f64) -> [u8; 3] {
+pub(crate) fn of(value: f64) -> [u8; 3] {
     let place = value.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
     let index = (place as usize).min(VIRIDIS.len() - 2);
     let fraction = place - index as f64;

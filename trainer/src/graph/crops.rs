@@ -3,9 +3,10 @@
 
 use super::flat::upload;
 use super::sums::{Sums, indices};
+use crate::constructor::{Constructors, Piece};
 use crate::crop::Crops;
-use crate::encoder::{SCALE_LOG2, for_latents};
 use crate::model::Ground;
+use crate::sampler::Window;
 use burn_tensor::{Device, Int, Tensor, TensorData};
 
 /// Images of crops, `[item][channel][row][column]`, from every texel of mip 0.
@@ -43,33 +44,41 @@ pub(crate) struct Construction {
     latent: Tensor<1, Int>,
     /// That share.
     share: Tensor<2>,
-    /// Latents of the grid in all crops.
+    /// Latents of the grid in all crops, all levels counted.
     pub(crate) latents: usize,
 }
 
 impl Construction {
-    /// That of grid `grid` for tensors of `shape` (items, rows, columns).
+    /// That of grid `grid` for tensors of `shape` (items, rows, columns) whose latents lie in
+    /// `windows`.
     pub(crate) fn new(
-        ground: &Ground<'_>,
-        grid: usize,
-        shape: (usize, usize, usize),
+        constructors: &Constructors,
+        (grid, shape): (usize, (usize, usize, usize)),
+        windows: &[Window],
         device: &Device,
     ) -> Construction {
-        let grids = &ground.config.grids[grid];
-        let channels = usize::from(grids.channels);
+        let channels = constructors.channels();
         let (items, rows, columns) = shape;
-        let cells = 1_usize << (2 * (SCALE_LOG2 - grids.scale_log2));
-        let latents = items * rows * columns * cells * channels;
-        let mut latent = vec![0; latents];
-        let mut share = vec![0.0; latents];
-        for_latents(shape, channels, grids.scale_log2, |from, to| {
+        let numbers = items * constructors.planes * rows * columns;
+        let cells: usize = windows.iter().map(|w| w.cells(grid)).sum();
+        let piece = Piece {
+            tensor: shape,
+            margin: 0,
+            origin: [0; 2],
+            extent: [columns, rows],
+        };
+        let mut latent = vec![0; numbers];
+        // A number that has a share in no latent stays at a share of nothing.
+        let mut share = vec![0.0; numbers];
+        constructors.for_latents(piece, grid, windows, |from, to, of_latent| {
             latent[from] = to as i32;
-            share[from] = 1.0;
+            share[from] = of_latent;
         });
+        let latents = cells * channels;
         Construction {
             channels,
             sums: Sums::new(&latent, latents),
-            share: upload(share, [latent.len(), 1], device),
+            share: upload(share, [numbers, 1], device),
             latent: indices(latent, device),
             latents,
         }

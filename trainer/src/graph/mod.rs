@@ -11,7 +11,7 @@
 //! outputs are this trainer's own. What is computed is what [`crate::crop`], [`crate::refine`] and
 //! [`crate::tile`] compute, from the same texels and the same noise; the numbers differ by the
 //! rounding of sums taken in another order. Parameters and moments come from and go to a [`Model`],
-//! so that checkpoints, export and the stage in the decode's own numbers need not know of this.
+//! so that checkpoints, export and the stages in the decode's own numbers need not know of this.
 
 mod crops;
 mod flat;
@@ -24,7 +24,7 @@ mod synthesizer;
 mod tests;
 
 use crate::adam::Rate;
-use crate::crop::Crops;
+use crate::crop::{self, Crops};
 use crate::encoder::{Encoder, backward_from};
 use crate::error::TrainError;
 use crate::latents::Rounding;
@@ -40,7 +40,7 @@ use shared::Shared;
 pub(crate) enum Subject {
     /// The encoder and its constructors, on crops.
     Encoder,
-    /// Both grids, on the whole set.
+    /// Both grids or nothing, on the whole set.
     Latents,
 }
 
@@ -81,7 +81,7 @@ impl Graph {
     ) -> Graph {
         let trained = match subject {
             Subject::Encoder => Trained::Encoder(Box::new(OnCrops {
-                encoder: Encoder::new(ground.config, ground.texels.channels),
+                encoder: crop::encoder(ground, &crop::constructors(ground)),
                 parameters: Flat::upload(&model.encoder, &model.encoder_moments, device),
                 constructions: None,
             })),
@@ -166,11 +166,12 @@ impl Graph {
             let cells = values.dims()[0] / channels;
             shared.seen(g, values.reshape([cells, channels]), drawn.roundings[g])
         });
-        let windows = [Window::whole(&ground.positions)];
-        let of_cells = shared.step(ground, &windows, drawn.texels, seen, of_synthesizer);
+        let windows = Window::whole(&ground.positions);
+        let way_back = shared.step(ground, &windows, drawn.texels, seen, of_synthesizer);
         let Some(rates) = of_latents else {
             return;
         };
+        let of_cells = way_back.gradients();
         let units = embedding.latent_unit();
         for (g, (latents, gradient)) in grids.iter_mut().zip(of_cells).enumerate() {
             let len = gradient.shape().num_elements();
@@ -201,9 +202,13 @@ impl OnCrops {
         let images = crops::images(ground, crops, &shared.texels);
         let outputs = self.encoder.run(&leaves, images);
         let shape = crops.shape();
+        let windows = crops.windows(ground);
         let constructions = match self.constructions.take() {
             Some((of, constructions)) if of == shape => constructions,
-            Some(_) | None => [0, 1].map(|g| Construction::new(ground, g, shape, &shared.device)),
+            Some(_) | None => {
+                let ways = crop::constructors(ground);
+                [0, 1].map(|g| Construction::new(&ways[g], (g, shape), &windows, &shared.device))
+            }
         };
         let bits = ground.embedding(Numbers::Real).bits;
         let reals = [0, 1].map(|g: usize| constructions[g].cells(outputs[g].clone().inner()));
@@ -212,8 +217,8 @@ impl OnCrops {
             let values = shared.limited(g, reals[g].clone() * codes);
             shared.seen(g, values, drawn.roundings[g])
         });
-        let windows = crops.windows(ground);
-        let of_cells = shared.step(ground, &windows, drawn.texels, seen, of_synthesizer);
+        let way_back = shared.step(ground, &windows, drawn.texels, seen, of_synthesizer);
+        let of_cells = way_back.gradients();
         let of_outputs = [0, 1].map(|g: usize| {
             // Beyond the range only a gradient that leads back counts.
             let (real, gradient) = (&reals[g], &of_cells[g]);

@@ -5,6 +5,7 @@ use super::flat::{Flat, download, upload};
 use super::places::Places;
 use super::synthesizer::Leaves;
 use crate::adam::Rate;
+use crate::batch::all_texels;
 use crate::error::TrainError;
 use crate::latents::Rounding;
 use crate::model::{Ground, Model};
@@ -20,6 +21,10 @@ pub(crate) struct Shared {
     pub(crate) texels: Tensor<2>,
     /// Where each mip starts among them.
     first_rows: Vec<usize>,
+    /// 1 for the texels that count, 0 for those that are masked out; none where all count.
+    covered: Option<Tensor<2>>,
+    /// How much each channel's squared error counts; none where all count alike.
+    weights: Option<Tensor<2>>,
     /// The smallest real of each channel.
     low: Tensor<2>,
     /// The smallest and the largest value of each grid's latents.
@@ -40,12 +45,22 @@ impl Shared {
             first_rows.push(rows);
             rows += mip.len() / channels;
         }
+        let masked = |mip: usize| ground.texels.covered(mip as u8).is_some();
+        let covered = (0..ground.texels.sizes.len()).any(masked).then(|| {
+            let covered = all_texels(&ground.texels.sizes)
+                .map(|t| f32::from(u8::from(ground.texels.is_covered(t.x, t.y, t.mip))));
+            upload(covered.collect(), [rows, 1], device)
+        });
+        let weights = &ground.texels.weights;
+        let weights = weights.iter().any(|&w| w != 1.0).then_some(weights);
         let mut moves = vec![1.0; model.parameters.len()];
         ground.hold_constants(&mut moves);
         let moves = moves.contains(&0.0).then_some(moves);
         Shared {
             texels: upload(ground.texels.mips().concat(), [rows, channels], device),
             first_rows,
+            covered,
+            weights: weights.map(|w| upload(w.clone(), [1, channels], device)),
             low: upload(ground.low.clone(), [1, channels], device),
             limits: [0, 1].map(|g: usize| {
                 let format = model.latents[g].format;
@@ -91,7 +106,7 @@ impl Shared {
     }
 
     /// Forward and backward over a batch and the update of the synthesizer. The loss is kept for
-    /// [`Shared::losses`]; the gradients of both grids' cells come back, in units of the inputs.
+    /// [`Shared::losses`].
     pub(crate) fn step(
         &mut self,
         ground: &Ground<'_>,
@@ -99,7 +114,7 @@ impl Shared {
         texels: &[Texel],
         seen: [Tensor<2>; 2],
         rate: Rate,
-    ) -> [Tensor<2>; 2] {
+    ) -> WayBack {
         let topology = &ground.topology;
         let embedding = ground.embedding(Numbers::Real);
         let cells = seen.each_ref().map(|s| s.dims()[0]);
@@ -123,11 +138,17 @@ impl Shared {
         let targets = self.texels.clone().select(0, places.rows.clone());
         let real = out.clone().inner().narrow(1, 0, channels);
         let low = self.low.clone().expand(real.dims());
-        let error = real.max_pair(low).clamp_max(1.0) - targets;
-        let square = error.clone() * error.clone();
-        self.losses.push(square.sum() * scale);
+        let mut error = real.max_pair(low).clamp_max(1.0) - targets;
+        if let Some(covered) = &self.covered {
+            error = error * covered.clone().select(0, places.rows.clone());
+        }
+        let weighted = match &self.weights {
+            Some(weights) => error.clone() * weights.clone(),
+            None => error.clone(),
+        };
+        self.losses.push((weighted.clone() * error).sum() * scale);
         // The scalar product with a constant has that constant as its gradient.
-        let mut gradients = (out.narrow(1, 0, channels) * (error * (2.0 * scale)))
+        let mut gradients = (out.narrow(1, 0, channels) * (weighted * (2.0 * scale)))
             .sum()
             .backward();
         let mut gradient = leaves.gradient(&mut gradients);
@@ -136,7 +157,22 @@ impl Shared {
         }
         self.synthesizer.update(rate, gradient);
         let of_inputs = inputs.grad_remove(&mut gradients);
-        let of_inputs = of_inputs.unwrap_or_else(|| inputs.inner().zeros_like());
-        places.gradients(&of_inputs)
+        WayBack {
+            of_inputs: of_inputs.unwrap_or_else(|| inputs.inner().zeros_like()),
+            places,
+        }
+    }
+}
+
+/// What is left of a step when the synthesizer has taken its share.
+pub(crate) struct WayBack {
+    places: Places,
+    of_inputs: Tensor<2>,
+}
+
+impl WayBack {
+    /// The gradients of both grids' cells, in units of the inputs.
+    pub(crate) fn gradients(&self) -> [Tensor<2>; 2] {
+        self.places.gradients(&self.of_inputs)
     }
 }

@@ -9,9 +9,37 @@ use ntmu_isa::layer::{HalfParameters, IntegerParameters, Parameters, integer_as_
 use ntmu_isa::position::AxisPosition;
 use ntmu_isa::profile::Profile;
 use ntmu_isa::round::saturate;
-use ntmu_isa::shape::{LaneFormat, Sampling};
+use ntmu_isa::shape::{GridShape, LaneFormat, Sampling, Shape};
 
 const PROFILE: Profile = Profile::NORMATIVE;
+
+/// Where the latents of a texel's four corners start in a grid, and the texel's position in it.
+pub(super) fn corners(
+    shape: &Shape,
+    grid: usize,
+    x: u32,
+    y: u32,
+    mip: u8,
+) -> ([usize; 4], [AxisPosition; 2]) {
+    let GridShape {
+        channels,
+        scale_log2,
+        ..
+    } = shape.grids[grid];
+    let level = shape.pyramid.level_of(mip);
+    let as_mip = shape.pyramid.mip_in_level(mip);
+    let [px, py] = [x, y].map(|t| AxisPosition::of(t, as_mip, scale_log2, shape.snap));
+    let (w, h) = shape.level_size(grid, level);
+    let xs = px.corners(w, shape.address_mode);
+    let ys = py.corners(h, shape.address_mode);
+    let base = shape.level_base(grid, level) as usize;
+    let start = |i: usize, j: usize| {
+        let cell = ys[j] as usize * w as usize + xs[i] as usize;
+        base + cell * usize::from(channels)
+    };
+    let starts = [start(0, 0), start(1, 0), start(0, 1), start(1, 1)];
+    (starts, [px, py])
+}
 
 /// The inputs of a texel.
 pub(super) fn inputs(asset: &Asset, x: u32, y: u32, mip: u8) -> Vec<i16> {
@@ -19,12 +47,8 @@ pub(super) fn inputs(asset: &Asset, x: u32, y: u32, mip: u8) -> Vec<i16> {
     let bits = shape.input_bits;
     let mut out = Vec::new();
     for (g, grid) in shape.grids.iter().enumerate() {
-        let [px, py] = [x, y].map(|t| AxisPosition::of(t, mip, grid.scale_log2, shape.snap));
-        let (w, h) = shape.grid_size(g);
-        let xs = px.corners(w, shape.address_mode);
-        let ys = py.corners(h, shape.address_mode);
-        let cells = [(0, 0), (1, 0), (0, 1), (1, 1)]
-            .map(|(i, j): (usize, usize)| asset.cell(g, xs[i], ys[j]));
+        let (corners, [px, py]) = corners(shape, g, x, y, mip);
+        let cells = corners.map(|at| &asset.grids[g][at..at + usize::from(grid.channels)]);
         let format = grid.format;
         match grid.sampling {
             Sampling::Corners => out.extend(

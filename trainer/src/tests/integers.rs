@@ -1,12 +1,12 @@
 //! The trainer's numbers are isa's.
 
 use super::by_isa::{decode, inputs};
-use super::{run, small, source};
+use super::{run, small, source, usual};
 use crate::batch::all_texels;
 use crate::model::Ground;
 use crate::sampler::{Numbers, Texel, Window};
 use crate::{
-    ActivationKind, Address, GridSampling, Precision, Snap, Source, Steps, TrainConfig, Trained,
+    ActivationKind, Address, GridSampling, Precision, Pyramid, Snap, Source, TrainConfig, Trained,
     WaveForm,
 };
 
@@ -23,6 +23,10 @@ fn embeddings() -> Vec<TrainConfig> {
         ..small()
     };
     let (triangle, saw) = (WaveForm::Triangle, WaveForm::Saw);
+    let with = |pyramid, address, snap| TrainConfig {
+        pyramid,
+        ..of(address, snap, [Corners, Interpolated], triangle, 0, 8)
+    };
     vec![
         of(
             Address::Wrap,
@@ -42,20 +46,20 @@ fn embeddings() -> Vec<TrainConfig> {
         ),
         of(Address::Clamp, Snap::Stride, [Interpolated; 2], saw, 15, 4),
         of(Address::Wrap, Snap::Cell, [Corners; 2], triangle, 1, 11),
+        with(Pyramid::NTC, Address::Mirror, Snap::Stride),
+        with(Pyramid::EVERY_MIP, Address::Wrap, Snap::Cell),
+        with(Pyramid::new(2, 1).unwrap(), Address::Clamp, Snap::Stride),
+        with(Pyramid::new(3, 3).unwrap(), Address::Clamp, Snap::Cell),
     ]
 }
 
 #[test]
 fn the_sampler_gives_isas_integers_at_every_texel() {
-    let steps = Steps {
-        encoder: 0,
-        refine: 1,
-        integer: 1,
-    };
+    let plan = usual([0, 1, 1]);
     for config in embeddings() {
         let source = source(45, 70, 7);
         let config = TrainConfig {
-            steps: Some(steps),
+            plan: Some(plan.clone()),
             ..config
         };
         let asset = run(&source, &config).unwrap().asset;
@@ -68,7 +72,7 @@ fn the_sampler_gives_isas_integers_at_every_texel() {
                 .map(|&c| format.value(c) as f32)
                 .collect()
         });
-        let windows = [Window::whole(&ground.positions)];
+        let windows = Window::whole(&ground.positions);
         let mut row = vec![9.0; config.input_count()];
         let sizes: Vec<_> = (0..7).map(|m| asset.shape.mip_size(m)).collect();
         for texel in all_texels(&sizes) {
@@ -201,11 +205,7 @@ fn halves_exported_from_reals_keep_the_quality() {
         let config = TrainConfig {
             activation,
             precision: Precision::Fp16,
-            steps: Some(Steps {
-                encoder: 0,
-                refine: 400,
-                integer: 0,
-            }),
+            plan: Some(usual([0, 400, 0])),
             ..small()
         };
         let trained = run(&source, &config).unwrap();
@@ -225,11 +225,7 @@ fn constant_channels_are_reproduced_exactly_beside_others() {
     for precision in [Precision::Int8, Precision::Fp16] {
         let config = TrainConfig {
             precision,
-            steps: Some(Steps {
-                encoder: 0,
-                refine: 20,
-                integer: 20,
-            }),
+            plan: Some(usual([0, 20, 20])),
             ..small()
         };
         let asset = run(&source, &config).unwrap().asset;
@@ -250,7 +246,7 @@ fn a_texel_is_seen_alike_through_a_crop_and_through_the_whole() {
     let config = small();
     let ground = Ground::new(&config, &source).unwrap();
     let embedding = ground.embedding(Numbers::Real);
-    let whole = Window::whole(&ground.positions);
+    let whole = Window::whole(&ground.positions)[0];
     // A crop of 8×8 encoder positions from (12, 14) on, which wraps: 16 positions an axis.
     let crop = Window {
         origin: [[24, 28], [12, 14]],

@@ -2,9 +2,14 @@
 
 mod by_isa;
 mod integers;
+mod loss;
+mod ntc;
+mod plans;
+mod pyramids;
 mod runs;
+mod safety;
 
-use crate::{GridConfig, Source, Steps, TrainConfig, TrainError, Trained, TrainingDevice, train};
+use crate::{GridConfig, Plan, Source, TrainConfig, TrainError, Trained, TrainingDevice, train};
 use ndarray::Array3;
 use ntmu_isa::asset::{Encoding, Map};
 use ntmu_isa::shape::OutputFormat;
@@ -43,7 +48,13 @@ pub(crate) fn source(width: usize, height: usize, mips: usize) -> Source {
         mips,
         outputs,
         maps,
+        mask: None,
     }
+}
+
+/// The plan of an effort, with these steps.
+fn usual(steps: [u64; 3]) -> Plan {
+    TrainConfig::default().usual_plan(steps)
 }
 
 pub(crate) fn small() -> TrainConfig {
@@ -66,11 +77,7 @@ pub(crate) fn small() -> TrainConfig {
         encoder_width: 8,
         crop: 64,
         crops: 2,
-        steps: Some(Steps {
-            encoder: 2,
-            refine: 30,
-            integer: 30,
-        }),
+        plan: Some(usual([2, 30, 30])),
         ..TrainConfig::default()
     }
 }

@@ -1,29 +1,16 @@
-//! Runs: quality, determinism, checkpoints, refusals.
+//! Runs: quality, determinism, refusals.
 
-use super::{run, small, source};
-use crate::checkpoint;
-use crate::model::{Ground, Model};
-use crate::refine::Rates;
-use crate::schedule::Stage;
-use crate::{
-    ActivationKind, GridSampling, Precision, Preset, Source, Steps, TrainConfig, TrainError,
-    TrainingDevice, WaveForm, train,
-};
+use super::{run, small, source, usual};
+use crate::{ActivationKind, GridSampling, Precision, Preset, TrainConfig, WaveForm};
 use ntmu_isa::shape::Shape;
-use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 #[test]
 fn training_improves_and_the_numbers_of_the_decode_keep_the_quality() {
     let source = source(64, 64, 5);
     let quality = |n: u64, config: &TrainConfig| {
-        let steps = Steps {
-            encoder: 0,
-            refine: n,
-            integer: n / 2,
-        };
+        let plan = usual([0, n, n / 2]);
         let config = TrainConfig {
-            steps: Some(steps),
+            plan: Some(plan),
             ..config.clone()
         };
         run(&source, &config).unwrap().report
@@ -70,136 +57,6 @@ fn the_same_seed_gives_the_same_asset_and_another_seed_another() {
     );
 }
 
-/// Stops a run at its `at`-th observation.
-fn stopped_at(
-    source: &Source,
-    config: &TrainConfig,
-    path: &Path,
-    at: u64,
-    resume: bool,
-) -> TrainError {
-    let stop = AtomicBool::new(false);
-    let mut observer = |p: &crate::Progress| {
-        stop.store(p.done >= at, std::sync::atomic::Ordering::Relaxed);
-    };
-    train(
-        source,
-        config,
-        &TrainingDevice::flex(),
-        Some(path),
-        resume,
-        &stop,
-        &mut observer,
-    )
-    .unwrap_err()
-}
-
-#[test]
-fn a_run_stopped_in_every_stage_and_resumed_equals_the_uninterrupted_run() {
-    let source = source(80, 72, 5);
-    let config = TrainConfig {
-        steps: Some(Steps {
-            encoder: 40,
-            refine: 40,
-            integer: 40,
-        }),
-        ..small()
-    };
-    let whole = run(&source, &config).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.checkpoint");
-    let mut resume = false;
-    for at in [20, 60, 100] {
-        let error = stopped_at(&source, &config, &path, at, resume);
-        assert!(
-            matches!(&error, TrainError::Stopped { checkpoint: Some(p), .. } if *p == path),
-            "{error}"
-        );
-        resume = true;
-    }
-    let stop = AtomicBool::new(false);
-    let resumed = train(
-        &source,
-        &config,
-        &TrainingDevice::flex(),
-        Some(&path),
-        true,
-        &stop,
-        &mut |_| {},
-    )
-    .unwrap();
-    assert_eq!(resumed.asset, whole.asset);
-    assert_eq!(
-        resumed.report.psnr_float.to_bits(),
-        whole.report.psnr_float.to_bits()
-    );
-}
-
-#[test]
-fn a_foreign_a_damaged_and_a_truncated_checkpoint_are_refused() {
-    let source = source(16, 16, 3);
-    let config = small();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.checkpoint");
-    let stop = AtomicBool::new(true);
-    train(
-        &source,
-        &config,
-        &TrainingDevice::flex(),
-        Some(&path),
-        false,
-        &stop,
-        &mut |_| {},
-    )
-    .unwrap_err();
-    let good = std::fs::read(&path).unwrap();
-    let stop = AtomicBool::new(false);
-    let resumed = |config: &TrainConfig, bytes: &[u8]| {
-        std::fs::write(&path, bytes).unwrap();
-        train(
-            &source,
-            config,
-            &TrainingDevice::flex(),
-            Some(&path),
-            true,
-            &stop,
-            &mut |_| {},
-        )
-    };
-    let other = resumed(
-        &TrainConfig {
-            seed: 9,
-            ..config.clone()
-        },
-        &good,
-    )
-    .unwrap_err();
-    assert!(other.to_string().contains("same configuration"), "{other}");
-    for at in [8, 20, 40, good.len() / 2, good.len() - 1] {
-        let mut damaged = good.clone();
-        damaged[at] ^= 4;
-        assert!(
-            matches!(
-                resumed(&config, &damaged),
-                Err(TrainError::Checkpoint { .. })
-            ),
-            "{at}"
-        );
-        assert!(
-            matches!(
-                resumed(&config, &good[..at]),
-                Err(TrainError::Checkpoint { .. })
-            ),
-            "{at}"
-        );
-    }
-    let every = TrainConfig {
-        checkpoint_every: 7,
-        ..config
-    };
-    assert!(resumed(&every, &good).is_ok());
-}
-
 #[test]
 fn sets_of_any_size_train() {
     for (width, height) in [(1, 1), (1, 40), (3, 2), (9, 65), (130, 70)] {
@@ -214,68 +71,12 @@ fn sets_of_any_size_train() {
 }
 
 #[test]
-fn a_loss_that_is_no_number_names_its_step() {
-    let source = source(16, 16, 2);
-    let config = small();
-    let ground = Ground::new(&config, &source).unwrap();
-    let mut model = Model::new(&ground).unwrap();
-    model.parameters[0] = f32::NAN;
-    let mut engine = crate::engine::Engine::new(&ground.topology, 768, 5);
-    let rates = Rates {
-        latents: 0.0,
-        synthesizer: 0.0,
-    };
-    assert!(
-        model
-            .step(&ground, &mut engine, Stage::Refine, 0, rates)
-            .is_nan()
-    );
-    // And through the front door: a checkpoint whose parameters are no numbers.
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.checkpoint");
-    let position = checkpoint::Position {
-        stage: Stage::Refine,
-        step: 5,
-        psnr_float: 0.0,
-    };
-    let identity = checkpoint::identity(&ground).unwrap();
-    model.start_encoder(&ground);
-    checkpoint::write(&path, identity, position, &model).unwrap();
-    let stop = AtomicBool::new(false);
-    let error = train(
-        &source,
-        &config,
-        &TrainingDevice::flex(),
-        Some(&path),
-        true,
-        &stop,
-        &mut |_| {},
-    )
-    .unwrap_err();
-    assert!(
-        matches!(
-            error,
-            TrainError::Diverged {
-                stage: "refine",
-                step: 5,
-                ..
-            }
-        ),
-        "{error}"
-    );
-}
-
-#[test]
 fn every_preset_is_valid_and_makes_an_asset_of_its_sizes() {
     let source = source(24, 16, 3);
     for preset in Preset::ALL {
         let config = TrainConfig {
             batch: 768,
-            steps: Some(Steps {
-                encoder: 0,
-                refine: 2,
-                integer: 2,
-            }),
+            plan: Some(usual([0, 2, 2])),
             ..preset.config()
         };
         let trained = run(&source, &config).unwrap();
@@ -288,7 +89,10 @@ fn every_preset_is_valid_and_makes_an_asset_of_its_sizes() {
         let outputs = source.outputs.clone();
         let mip_count = source.mips.len() as u8;
         let asset = &trained.asset;
-        let shape = preset.shape(asset.shape.width, asset.shape.height, mip_count, outputs);
+        let shape = Shape {
+            pyramid: config.pyramid,
+            ..preset.shape(asset.shape.width, asset.shape.height, mip_count, outputs)
+        };
         assert_eq!(asset.shape, shape, "{}", preset.name);
         let layers = asset.layers.iter();
         let sizes: Vec<(u16, u16)> = layers.map(|l| (l.inputs, l.outputs)).collect();
