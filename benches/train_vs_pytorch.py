@@ -5,14 +5,13 @@
 
 Latents and synthesizer are trained directly, in reals, as the first stage of `ntmu encode` does. The
 PyTorch program draws its start, its texels and its noise from the same counters as the trainer, so that
-both walk the same path until rounding parts them: the losses of the first steps are compared and must
-agree, which shows that both compute the same thing. Then, for every time given with --seconds, each gets
-as many steps as it makes in that time, with the whole fall of the learning rate over them, and the PSNR of
-mip 0 is taken with rounded latents and the real synthesizer. Steps per second and that PSNR are the
-result; each ratio is ours over PyTorch's.
+both walk the same path until rounding parts them: the mean loss of the first twenty steps has to agree,
+or the script ends with 1. Then, for every time given with --seconds, each gets as many steps as it makes in
+that time, with the whole fall of the learning rate over them, and the PSNR of all mips and channels is
+taken with rounded latents and the real synthesizer. Steps per second and that PSNR are the result; the
+ratio is ours over PyTorch's.
 
-PyTorch runs eagerly in f32 with fused Adam, once with gathers by index and once by one flat index for each
-grid (the faster counts). The environment goes to `versus/` under the target folder.
+PyTorch runs eagerly in f32 with fused Adam. The environment goes to `versus/` under the target folder.
 
 The set is a folder of images whose names say which map they hold (by default the built-in set at 1024
 texels); 8-bit images only, because another program has to read them alike.
@@ -326,24 +325,24 @@ class Pytorch:
         return loss
 
     def psnr(self):
-        """Of mip 0 with rounded latents."""
+        """Of all mips and channels, with rounded latents."""
         import torch
 
-        s = self.setting
-        width, height = s.sizes[0]
-        total = 0.0
+        s, total = self.setting, 0.0
         with torch.no_grad():
             seen = [torch.floor(g + 0.5).clamp(-(1 << b - 1) + 1, 1 << b - 1) for g, (_, b, _) in zip(self.latents, s.grids)]
-            for y in range(height):
-                x = torch.arange(width)
-                row = self.network(self.inputs(seen, x, torch.full_like(x, y), torch.zeros_like(x))).clamp(0, 1)
-                total += float(((row - s.texels[y * width : (y + 1) * width]).double() ** 2).sum())
-        return -10 * math.log10(total / (width * height * s.channels))
+            for mip, ((width, height), start) in enumerate(zip(s.sizes, s.texel_start.tolist())):
+                rows = max(1, 32768 // width)
+                for top in range(0, height, rows):
+                    at = torch.arange(top * width, min(top + rows, height) * width)
+                    found = self.network(self.inputs(seen, at % width, at // width, torch.full_like(at, mip))).clamp(0, 1)
+                    total += float(((found - s.texels[start + at]).double() ** 2).sum())
+        return -10 * math.log10(total / s.texels.numel())
 
 
 def step_key(step):
-    """The trainer's number of a step of its first stage on the whole set."""
-    return (1 << 48) | step
+    """The trainer's number of a step of its first stage."""
+    return step
 
 
 def rate_factor(step, steps):
@@ -351,3 +350,99 @@ def rate_factor(step, steps):
     rise = min((step + 1) / warm, 1.0)
     fall = 0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * min(step / max(steps, 1), 1.0)))
     return rise * fall
+
+
+# Steps whose losses have to agree, and how well: f32 sums in another order, a few hundred terms long, part
+# by about 1e-5; a difference of kind (a texel, a weight, a rate) parts them by far more.
+COMPARED, AGREEMENT = 20, 1e-3
+SMOOTHING = 0.02
+
+
+def binary(arguments):
+    if arguments.binary:
+        return arguments.binary
+    subprocess.run(["cargo", "build", "--release", "-q", "--features", "train"], cwd=ROOT, check=True)
+    return str(TARGET / "release" / "ntmu")
+
+
+def encode(program, folder, arguments, config_lines, steps, source):
+    """Trains `steps` steps in reals; the result, the log, and the seconds of the steps."""
+    plan, config = folder / "plan.toml", folder / "config.toml"
+    plan.write_text(
+        f'name = "reals"\n[[stage]]\ntrain = "latents"\nsteps = {steps}\nbatch = {arguments.batch}\n'
+        'warm_up = 100\nlatents = "noise"\nnumbers = "real"\n'
+    )
+    config.write_text("\n".join([*config_lines, f"checkpoint_every = {1 << 40}", ""]))
+    log, out = folder / "train.jsonl", folder / "out.ntx"
+    log.unlink(missing_ok=True)
+    command = [program, "encode", str(source), "-o", str(out), "--preset", arguments.preset, "--plan", str(plan),
+               "--config", str(config), "--seed", str(arguments.seed), "--log", str(log), "--json"]
+    environment = {**os.environ, "RAYON_NUM_THREADS": str(arguments.threads)}
+    result = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    return json.loads(result.stdout), [json.loads(line) for line in log.read_text().splitlines()]
+
+
+def main():
+    arguments = parse()
+    enter(arguments.venv, ["numpy", "pillow"], True)
+    import numpy
+    import torch
+
+    torch.set_num_threads(arguments.threads)
+    before = conditions([numpy, torch])
+    program = binary(arguments)
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        source = Path(arguments.set) if arguments.set else folder / "set"
+        if not arguments.set:
+            subprocess.run([program, "generate", "-o", str(source), "--size", "1024"], check=True, stdout=subprocess.DEVNULL)
+        measured, log = encode(program, folder, arguments, [], 10 * COMPARED, source)
+        config = measured["training"]["config"]
+        maps = [m["map"] for m in measured["quality"]["maps"]]
+        setting = Setting(config, read_set(source, maps), arguments.seed, arguments.batch)
+
+        theirs, smooth = Pytorch(setting), None
+        for step in range(COMPARED):
+            loss = float(theirs.step(step, 10 * COMPARED))
+            smooth = loss if smooth is None else smooth + SMOOTHING * (loss - smooth)
+        ours = next(line["loss"] for line in log if line["step"] == COMPARED)
+        apart = abs(ours / smooth - 1)
+        print(f"loss after {COMPARED} steps: {ours:.6e} and in PyTorch {smooth:.6e}, {apart:.1e} apart", file=sys.stderr)
+        if apart > AGREEMENT:
+            sys.exit(1)
+
+        start, warm = time.perf_counter(), 40
+        for step in range(COMPARED, COMPARED + warm):
+            theirs.step(step, 10 * COMPARED)
+        speeds = {"torch": warm / (time.perf_counter() - start)}
+        stage = measured["training"]["stages"][0]
+        speeds["ntmu"] = 10 * COMPARED / stage["seconds"]
+
+        figures = []
+        for seconds in arguments.seconds:
+            steps = max(int(seconds * speeds["torch"]), 1)
+            theirs = Pytorch(setting)
+            start = time.perf_counter()
+            for step in range(steps):
+                theirs.step(step, steps)
+            took = time.perf_counter() - start
+            speeds["torch"] = steps / took
+            torch_figure = {"steps": steps, "seconds": took, "psnr": theirs.psnr()}
+            # As long as the other took, at the speed of the run before.
+            steps = max(int(took * speeds["ntmu"]), 1)
+            result, _ = encode(program, folder, arguments, [], steps, source)
+            took = result["training"]["stages"][0]["seconds"]
+            speeds["ntmu"] = steps / took
+            our_figure = {"steps": steps, "seconds": took, "psnr": result["training"]["psnr_float"]}
+            figures.append({"seconds": seconds, "ntmu": our_figure, "torch": torch_figure,
+                            "steps_ratio": speeds["ntmu"] / speeds["torch"], "psnr_ahead": our_figure["psnr"] - torch_figure["psnr"]})
+            print(f"{seconds:6.0f} s  ntmu {our_figure['steps']} steps, {our_figure['psnr']:.2f} dB   "
+                  f"torch {torch_figure['steps']} steps, {torch_figure['psnr']:.2f} dB   "
+                  f"steps {figures[-1]['steps_ratio']:.2f} times, {figures[-1]['psnr_ahead']:+.2f} dB")
+    write(arguments.json, {"conditions": {**before, "load_average_after": os.getloadavg()}, "set": arguments.set or "built-in, 1024",
+                           "preset": arguments.preset, "batch": arguments.batch, "threads": arguments.threads,
+                           "agreement": apart, "figures": figures})
+
+
+if __name__ == "__main__":
+    main()

@@ -10,6 +10,7 @@ mod curve;
 mod decode;
 mod disasm;
 mod encode;
+mod evaluate;
 mod generate;
 mod info;
 mod microprogram;
@@ -43,6 +44,8 @@ enum Verb {
     Study(study::Study),
     /// Train an asset on a texture set.
     Encode(Box<encode::Encode>),
+    /// Code sets by several codecs at several rates, and compare them: tables, curves, BD-rates.
+    Evaluate(evaluate::Evaluate),
     /// Decode an asset to image files.
     Decode(decode::Decode),
     /// Show what an asset holds.
@@ -87,6 +90,7 @@ impl Arguments {
         match self.verb {
             Verb::Study(verb) => verb.run(json),
             Verb::Encode(verb) => verb.run(json),
+            Verb::Evaluate(verb) => verb.run(json),
             Verb::Decode(verb) => verb.run(json),
             Verb::Info(verb) => verb.run(json),
             Verb::Texel(verb) => verb.run(json),

@@ -1,6 +1,6 @@
 //! Presets: configurations with a name.
 
-use crate::choices::{Precision, Pyramid};
+use crate::choices::Precision;
 use crate::config::{GridConfig, TrainConfig};
 use crate::error::TrainError;
 use ntmu_isa::preset;
@@ -56,11 +56,7 @@ impl Preset {
                 bits: grid.format.bits(),
                 scale_log2: grid.scale_log2,
             }),
-            pyramid: if self.name.starts_with("ntc-") {
-                Pyramid::NTC
-            } else {
-                self.pyramid
-            },
+            pyramid: self.pyramid,
             sampling: self.grids.map(|grid| grid.sampling.into()),
             hidden: self.hidden.to_vec(),
             residual_blocks: self.residual_blocks,
