@@ -18,15 +18,12 @@ import argparse
 import json
 import os
 import platform
-import re
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
-
-LINE = re.compile(r"^(\S+) (\d+)/(\d+)\s+loss (\S+)\s+about (\S+) dB")
 
 
 def run(command, **more):
@@ -42,45 +39,55 @@ def run(command, **more):
             "seconds": round(took, 3), "result": found, "stderr": done.stderr[-2000:]}
 
 
+PLAN = """name = "gpu"
+[[stage]]
+train = "encoder"
+steps = {steps}
+crop = {crop}
+crops = 4
+latents = "noise"
+numbers = "real"
+[[stage]]
+train = "latents"
+steps = {steps}
+latents = "noise"
+numbers = "real"
+[[stage]]
+train = "latents"
+steps = 200
+latents = "rounded"
+numbers = "deployed"
+"""
+
+
 def train(arguments, folder):
-    """The curve of a run of `encode`, from its progress lines, each with the time at which it came."""
-    asset = folder / "trained.ntx"
-    config = folder / "config.toml"
+    """The curve of a run of `encode`, from the log that it writes."""
+    asset, config, plan, log = (folder / name for name in ("trained.ntx", "config.toml", "plan.toml", "train.jsonl"))
     # Crops, width and batch of the paper's last rows; steps that a GPU does not exhaust in minutes.
-    config.write_text(f"encoder_width = {arguments.width}\ncrop = {arguments.crop}\ncrops = 4\n"
-                      f"batch = {arguments.batch}\ncheckpoint_every = 1000\n"
-                      f"[steps]\nencoder = {arguments.steps}\nrefine = {arguments.steps}\ninteger = 200\n")
+    config.write_text(f"encoder_width = {arguments.width}\nbatch = {arguments.batch}\ncheckpoint_every = 1000\n")
+    plan.write_text(PLAN.format(steps=arguments.steps, crop=arguments.crop))
     source = [arguments.set] if arguments.set else ["--built-in"]
     command = [arguments.binary, "encode", *source, "-o", asset, "--preset", arguments.preset, "--config", config,
-               "--backend", arguments.backend, "--json"]
-    if "--log " in subprocess.run([arguments.binary, "encode", "--help"], capture_output=True, text=True).stdout:
-        command += ["--log", folder / "train.jsonl"]
+               "--plan", plan, "--backend", arguments.backend, "--log", log, "--json"]
     started = time.monotonic()
     process = subprocess.Popen([str(part) for part in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     signal.signal(signal.SIGALRM, lambda *_: process.send_signal(signal.SIGINT))
     signal.alarm(max(1, int(60 * arguments.minutes)))
-    curve, notes = [], []
+    notes = []
     for line in process.stderr:
-        found = LINE.match(line.strip())
-        if not found:
-            notes.append(line.rstrip())
-            continue
-        stage, step, steps, loss, psnr = found.groups()
-        curve.append({"seconds": round(time.monotonic() - started, 3), "stage": stage, "step": int(step),
-                      "steps": int(steps), "loss": float(loss), "psnr": float(psnr)})
+        notes.append(line.rstrip())
         print(line.rstrip(), file=sys.stderr)
     output = process.stdout.read()
     status = process.wait()
     signal.alarm(0)
-    log = folder / "train.jsonl"
-    return {"command": " ".join(str(part) for part in command[1:]), "config": config.read_text(), "status": status,
-            "seconds": round(time.monotonic() - started, 3), "curve": curve, "notes": notes,
-            "log": [json.loads(row) for row in log.read_text().splitlines()] if log.exists() else None,
+    return {"command": " ".join(str(part) for part in command[1:]), "config": config.read_text(),
+            "plan": plan.read_text(), "status": status, "seconds": round(time.monotonic() - started, 3),
+            "curve": [json.loads(row) for row in log.read_text().splitlines()] if log.exists() else [], "notes": notes,
             "result": json.loads(output) if status == 0 and output else None}, asset
 
 
 def rates(curve):
-    """Steps a second of each stage between its first and its last progress line."""
+    """Steps a second of each stage between its first and its last line of the log."""
     out = {}
     for stage in {point["stage"] for point in curve}:
         points = [point for point in curve if point["stage"] == stage]

@@ -25,8 +25,8 @@ const CHANGE: f64 = 4.0;
 /// Steps before the clock starts: the first ones warm caches and pages, or compile kernels.
 const WARM_UP: u64 = 2;
 
-/// Steps between two looks at the clock on a device, which has to finish them for that.
-const AT_ONCE: u64 = 10;
+/// The most steps between two looks at the clock on a device, which has to finish them for that.
+const AT_ONCE: u64 = 16;
 
 /// What is kept back for what was not foreseen.
 const KEPT: f64 = 0.02;
@@ -131,7 +131,6 @@ fn seconds_of_step(
     share: f64,
 ) -> Result<f64, TrainError> {
     let mut stepper = Stepper::new(ground, model, stage, device);
-    let at_once = if stepper.is_remote() { AT_ONCE } else { 1 };
     let mut clock = Instant::now();
     let (mut step, mut counted) = (0, 0_u64);
     loop {
@@ -147,7 +146,7 @@ fn seconds_of_step(
                 continue;
             }
         }
-        if !counted.is_multiple_of(at_once) {
+        if stepper.is_remote() && !counted.is_power_of_two() && !counted.is_multiple_of(AT_ONCE) {
             continue;
         }
         stepper.losses()?;

@@ -166,27 +166,30 @@ fn a_loss_that_is_no_number_names_its_step() {
     model.start_encoder(&ground);
     checkpoint::write(&path, identity, &position, &model).unwrap();
     let stop = AtomicBool::new(false);
-    let error = train(
-        &source,
-        &config,
-        &TrainingDevice::flex(),
-        Some(&path),
-        true,
-        &stop,
-        &mut |_| {},
-    )
-    .unwrap_err();
-    assert!(
-        matches!(
-            error,
-            TrainError::Diverged {
-                stage: "latents",
-                step: 5,
-                ..
-            }
-        ),
-        "{error}"
-    );
+    // A device's losses are read together, some steps later.
+    for device in [TrainingDevice::flex(), TrainingDevice::graph_on_flex()] {
+        let error = train(
+            &source,
+            &config,
+            &device,
+            Some(&path),
+            true,
+            &stop,
+            &mut |_| {},
+        )
+        .unwrap_err();
+        assert!(
+            matches!(
+                error,
+                TrainError::Diverged {
+                    stage: "latents",
+                    step: 5,
+                    ..
+                }
+            ),
+            "{error}"
+        );
+    }
 }
 
 /// A plan with a stage of every kind.
