@@ -73,6 +73,7 @@ impl Memory {
 
 /// What a step on crops holds: the images, every output that the way back needs, and the gradients
 /// that are under way at the finest positions. Channels are padded as [`crate::convolution`] has them.
+/// For four 512² crops of 8 channels at width 32, a whole run is estimated at 754 MB where one took 648.
 fn of_encoder(config: &TrainConfig, stage: &Stage, channels: u64, (w, h): (u32, u32)) -> u64 {
     let side = |n: u32| u64::from(n.min(stage.crop).next_multiple_of(8));
     let texels = u64::from(stage.crops) * side(w) * side(h);

@@ -12,7 +12,7 @@ use crate::stage::{Rates, Stage};
 pub(crate) enum Stepper {
     /// The processor's own kernels. Every step changes the model.
     Processor {
-        engine: Engine,
+        engine: Box<Engine>,
         /// Those that nobody has read.
         losses: Vec<f64>,
     },
@@ -31,8 +31,9 @@ impl Stepper {
         device: &TrainingDevice,
     ) -> Stepper {
         if device.backend() == Backend::Flex || stage.is_deployed() {
+            let channels = ground.texels.channels;
             return Stepper::Processor {
-                engine: Engine::new(&ground.topology, stage.batch, ground.texels.channels),
+                engine: Box::new(Engine::new(&ground.topology, stage.batch, channels)),
                 losses: Vec::new(),
             };
         }
