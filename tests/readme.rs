@@ -38,7 +38,18 @@ fn every_command_of_the_readme_runs() {
         ("DIR", path("DIR")),
         ("out.ntx", path("wall.ntx")),
         ("IMAGES", path("IMAGES")),
+        (
+            "plans/evaluate/smoke.toml",
+            concat!(env!("CARGO_MANIFEST_DIR"), "/plans/evaluate/smoke.toml").to_owned(),
+        ),
     ]);
+    for (file, psnr) in [("anchor.json", 30.0), ("test.json", 31.0)] {
+        let curve = serde_json::json!({
+            "name": file, "description": "",
+            "results": { "bpp": [1.0, 2.0, 4.0], "psnr": [psnr, psnr + 3.0, psnr + 6.0] },
+        });
+        std::fs::write(path(file), curve.to_string()).unwrap();
+    }
     run(
         &["generate".into(), "-o".into(), path("DIR")],
         folder.path(),

@@ -24,7 +24,7 @@ fn decibels(asset: &Asset, source: &Source) -> Vec<f64> {
 }
 
 fn assert_decoded_as_trained(config: &TrainConfig, levels: u8) {
-    let source = support::source::brick_wall(64);
+    let source = support::source::brick_wall(256);
     let config = TrainConfig {
         batch: 768,
         plan: Some(config.usual_plan([0, 60, 30])),

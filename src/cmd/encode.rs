@@ -26,7 +26,7 @@ pub(crate) struct Encode {
     #[arg(long, default_value = "medium")]
     effort: String,
     /// What to train, stage after stage, instead of what follows from the effort: paper,
-    /// paper-short, direct, encoder-first, or a TOML file.
+    /// paper-short, direct, encoder-first, ntc, or a TOML file.
     #[arg(long, value_name = "PLAN", conflicts_with = "effort")]
     plan: Option<String>,
     /// Steps of each stage of the plan, `0+3000+1000`: those in the record of an asset repeat its
@@ -87,6 +87,9 @@ pub(crate) struct Encode {
     /// Widths of the plain hidden layers instead of the preset's, `64,64`.
     #[arg(long, value_delimiter = ',', value_name = "WIDTHS")]
     hidden: Option<Vec<u16>>,
+    /// Which levels the grids have: single, ntc or every-mip.
+    #[arg(long, value_name = "PYRAMID")]
+    pyramid: Option<String>,
     /// Residual blocks instead of the preset's.
     #[arg(long, value_name = "COUNT")]
     blocks: Option<u8>,

@@ -2,7 +2,9 @@
 
 use super::{Encode, smaller};
 use anyhow::Context as _;
-use ntmu::trainer::{EFFORTS, Plan, Precision, Preset, Source, TrainConfig, TrainingDevice};
+use ntmu::trainer::{
+    EFFORTS, PYRAMIDS, Plan, Precision, Preset, Source, TrainConfig, TrainingDevice,
+};
 use std::path::Path;
 
 impl Encode {
@@ -67,6 +69,13 @@ impl Encode {
     fn shape(&self, config: &mut TrainConfig) -> anyhow::Result<()> {
         if let Some(hidden) = &self.hidden {
             config.hidden.clone_from(hidden);
+        }
+        if let Some(name) = &self.pyramid {
+            let found = PYRAMIDS.iter().find(|(known, _)| known == name);
+            config.pyramid = found.map(|(_, pyramid)| *pyramid).with_context(|| {
+                let names = PYRAMIDS.map(|(name, _)| name).join(", ");
+                format!("pyramid: found {name:?}; allowed: {names}")
+            })?;
         }
         if let Some(blocks) = self.blocks {
             config.residual_blocks = blocks;
