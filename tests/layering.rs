@@ -16,7 +16,7 @@ const MAY_USE: [(&str, &[&str]); 5] = [
 ];
 
 /// Outside crates that only one room may know.
-const OWNED: [(&str, &str); 2] = [("burn", "trainer"), ("wgpu", "shaders")];
+const OWNED: [(&str, &str); 2] = [("burn-tensor", "trainer"), ("wgpu", "shaders")];
 
 fn manifest(folder: &str) -> toml::Table {
     let path = Path::new(ROOT).join(folder).join("Cargo.toml");

@@ -13,7 +13,7 @@ use ntmu::isa::sampler::{Detail, SampleRequest, Sampler};
 use ntmu::isa::{Asset, Program, image};
 use ntmu::model::Request;
 use ntmu::model::exec::Decoder;
-use ntmu::trainer::{self, Precision, Preset, TrainConfig};
+use ntmu::trainer::{self, Precision, Preset, TrainConfig, TrainingDevice};
 use std::sync::atomic::AtomicBool;
 
 fn trained(preset: &Preset, precision: Precision) -> Asset {
@@ -31,7 +31,15 @@ fn trained_as(config: &TrainConfig) -> Asset {
     };
     let stop = AtomicBool::new(false);
     let source = support::source::brick_wall(32);
-    let trained = trainer::train(&source, &config, None, false, &stop, &mut |_| ());
+    let trained = trainer::train(
+        &source,
+        &config,
+        &TrainingDevice::flex(),
+        None,
+        false,
+        &stop,
+        &mut |_| (),
+    );
     trained.unwrap().asset
 }
 

@@ -7,7 +7,7 @@ mod training;
 
 use ntmu::decoded::Decoded;
 use ntmu::quality::{Quality, maps_of};
-use ntmu::trainer::{self, Precision, Preset, TrainConfig, TrainReport};
+use ntmu::trainer::{self, Precision, Preset, TrainConfig, TrainReport, TrainingDevice};
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
@@ -15,7 +15,16 @@ use std::sync::atomic::AtomicBool;
 fn decoded(config: &TrainConfig) -> (f64, TrainReport) {
     let source = support::source::brick_wall(64);
     let stop = AtomicBool::new(false);
-    let trained = trainer::train(&source, config, None, false, &stop, &mut |_| ()).unwrap();
+    let trained = trainer::train(
+        &source,
+        config,
+        &TrainingDevice::flex(),
+        None,
+        false,
+        &stop,
+        &mut |_| (),
+    )
+    .unwrap();
     let asset = trained.asset;
     let reals = Decoded::of(&asset, |_| ()).reals(&asset.shape);
     let quality = Quality::measure(&source.mips, &reals, &maps_of(&asset)).unwrap();

@@ -6,7 +6,7 @@ mod support;
 
 use ntmu::decoded::Decoded;
 use ntmu::isa::Asset;
-use ntmu::trainer::{self, Precision, Preset, Pyramid, Source, TrainConfig};
+use ntmu::trainer::{self, Precision, Preset, Pyramid, Source, TrainConfig, TrainingDevice};
 use std::sync::atomic::AtomicBool;
 
 /// The decibels of the model's codes, mip by mip.
@@ -31,7 +31,16 @@ fn assert_decoded_as_trained(config: &TrainConfig, levels: u8) {
         ..config.clone()
     };
     let stop = AtomicBool::new(false);
-    let trained = trainer::train(&source, &config, None, false, &stop, &mut |_| ()).unwrap();
+    let trained = trainer::train(
+        &source,
+        &config,
+        &TrainingDevice::flex(),
+        None,
+        false,
+        &stop,
+        &mut |_| (),
+    )
+    .unwrap();
     let asset = trained.asset;
     assert_eq!(asset.shape.pyramid, config.pyramid);
     assert_eq!(asset.shape.level_count(), levels);

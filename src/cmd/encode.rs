@@ -81,6 +81,9 @@ pub(crate) struct Encode {
     /// Where the checkpoint is kept; beside the output, ending in .checkpoint, by default.
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
+    /// What computes the training steps in reals: flex (the processor), wgpu, vulkan or cuda.
+    #[arg(long, default_value = "flex")]
+    backend: String,
     /// Widths of the plain hidden layers instead of the preset's, `64,64`.
     #[arg(long, value_delimiter = ',', value_name = "WIDTHS")]
     hidden: Option<Vec<u16>>,

@@ -54,7 +54,7 @@ mod with_trainer {
     use super::{AtomicBool, EvaluateError, Neural, Path, TextureSet, Trained};
     use crate::decoded::Decoded;
     use crate::quality;
-    use crate::trainer::{self, EFFORTS, Plan, Precision, Preset, TrainConfig};
+    use crate::trainer::{self, EFFORTS, Plan, Precision, Preset, TrainConfig, TrainingDevice};
     use crate::training_source::training_source;
     use std::time::Instant;
 
@@ -78,6 +78,7 @@ mod with_trainer {
         let trained = trainer::train(
             &source,
             &config,
+            &TrainingDevice::flex(),
             Some(checkpoint),
             true,
             stop,

@@ -21,9 +21,9 @@ pub(crate) struct Moments {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rate {
     /// Learning rate over the bias correction of the first moment.
-    step: f32,
+    pub(crate) step: f32,
     /// One over the root of the bias correction of the second moment.
-    root: f32,
+    pub(crate) root: f32,
 }
 
 impl Rate {

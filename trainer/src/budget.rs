@@ -4,12 +4,13 @@
 //! with as many: a run that a time has fixed can be repeated without a clock. What a machine's load
 //! makes of the prediction shows when a stage is done; the stages after it are fitted anew.
 
-use crate::engine::Engine;
+use crate::device::TrainingDevice;
 use crate::error::TrainError;
 use crate::model::{Ground, Model};
 use crate::plan::Train;
 use crate::sampler::Numbers;
 use crate::stage::Stage;
+use crate::stepper::Stepper;
 use std::time::Instant;
 
 /// The share of the time that goes to measuring how long a step of a stage takes, over all stages.
@@ -21,8 +22,11 @@ const MOST: f64 = 10.0;
 /// How far a later fit may change the steps of a stage, either way.
 const CHANGE: f64 = 4.0;
 
-/// Steps before the clock starts: the first ones warm caches and pages.
+/// Steps before the clock starts: the first ones warm caches and pages, or compile kernels.
 const WARM_UP: u64 = 2;
+
+/// The most steps between two looks at the clock on a device, which has to finish them for that.
+const AT_ONCE: u64 = 16;
 
 /// What is kept back for what was not foreseen.
 const KEPT: f64 = 0.02;
@@ -45,8 +49,8 @@ impl Budget {
         ground: &Ground<'_>,
         model: &Model,
         stages: &mut [Stage],
-        seconds: f64,
-        started: Instant,
+        device: &TrainingDevice,
+        (seconds, started): (f64, Instant),
     ) -> Result<Budget, TrainError> {
         let mut scratch = model.clone();
         let evaluation = Instant::now();
@@ -71,7 +75,7 @@ impl Budget {
                 scratch.calibrate(ground);
             }
             between += preparing.elapsed().as_secs_f64();
-            costs.push(seconds_of_step(ground, &mut scratch, stage, share)?);
+            costs.push(seconds_of_step(ground, &mut scratch, stage, device, share)?);
         }
         let budget = Budget {
             seconds,
@@ -123,28 +127,32 @@ fn seconds_of_step(
     ground: &Ground<'_>,
     model: &mut Model,
     stage: &Stage,
+    device: &TrainingDevice,
     share: f64,
 ) -> Result<f64, TrainError> {
-    let mut engine = Engine::new(&ground.topology, stage.batch, ground.texels.channels);
+    let mut stepper = Stepper::new(ground, model, stage, device);
     let mut clock = Instant::now();
-    let (mut step, mut counted) = (0, 0);
+    let (mut step, mut counted) = (0, 0_u64);
     loop {
         let rates = stage.rates_at(step.min(stage.steps - 1));
-        match stage.train {
-            Train::Encoder => {
-                model.encoder_step(ground, &mut engine, stage, step, rates)?;
-            }
-            Train::Latents | Train::Synthesizer => {
-                model.step(ground, &mut engine, stage, step, rates);
+        stepper.step(ground, model, stage, step, rates)?;
+        (step, counted) = (step + 1, counted + 1);
+        if step == WARM_UP {
+            stepper.losses()?;
+            // What a kernel costs to compile is paid once; a step that alone fills the share is the
+            // measurement.
+            if stepper.is_remote() || clock.elapsed().as_secs_f64() < share {
+                (clock, counted) = (Instant::now(), 0);
+                continue;
             }
         }
-        (step, counted) = (step + 1, counted + 1);
+        if stepper.is_remote() && !counted.is_power_of_two() && !counted.is_multiple_of(AT_ONCE) {
+            continue;
+        }
+        stepper.losses()?;
         let spent = clock.elapsed().as_secs_f64();
         if spent >= share {
-            return Ok(spent / f64::from(counted));
-        }
-        if step == WARM_UP {
-            (clock, counted) = (Instant::now(), 0);
+            return Ok(spent / counted as f64);
         }
     }
 }

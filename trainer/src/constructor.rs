@@ -70,6 +70,11 @@ impl Constructors {
         }
     }
 
+    /// Channels of a latent.
+    pub(crate) const fn channels(&self) -> usize {
+        self.channels
+    }
+
     /// log2 of the encoder positions of a level's cell along an axis.
     pub(crate) fn pool_log2(&self, level: usize) -> u8 {
         self.ways[level].pool_log2

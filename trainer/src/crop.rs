@@ -43,13 +43,13 @@ pub(crate) struct Crops {
 }
 
 /// The constructors of both grids.
-fn constructors(ground: &Ground<'_>) -> [Constructors; 2] {
+pub(crate) fn constructors(ground: &Ground<'_>) -> [Constructors; 2] {
     let levels = ground.positions.level_count();
     [0, 1].map(|g| Constructors::new(ground.config, g, levels))
 }
 
 /// The encoder before these constructors.
-fn encoder(ground: &Ground<'_>, constructors: &[Constructors; 2]) -> Encoder {
+pub(crate) fn encoder(ground: &Ground<'_>, constructors: &[Constructors; 2]) -> Encoder {
     let planes = [constructors[0].planes, constructors[1].planes];
     Encoder::new(ground.config, ground.texels.channels, planes)
 }
@@ -90,7 +90,8 @@ impl Crops {
         }
     }
 
-    fn shape(&self) -> (usize, usize, usize) {
+    /// Crops, and the rows and columns of encoder positions of each.
+    pub(crate) fn shape(&self) -> (usize, usize, usize) {
         (
             self.origins.len(),
             self.size[1] as usize,
@@ -99,7 +100,7 @@ impl Crops {
     }
 
     /// Where the latents of each level of each crop lie, crop after crop.
-    fn windows(&self, ground: &Ground<'_>) -> Vec<Window> {
+    pub(crate) fn windows(&self, ground: &Ground<'_>) -> Vec<Window> {
         let constructors = constructors(ground);
         let levels = ground.positions.level_count();
         let mut base = [0; 2];
@@ -122,8 +123,33 @@ impl Crops {
         windows
     }
 
+    /// The columns and the rows of mip 0 that each crop shows; one that wraps leaves the set on one
+    /// side and enters it on the other.
+    pub(crate) fn lines(&self, ground: &Ground<'_>) -> Vec<[Vec<u32>; 2]> {
+        let (width, height) = ground.texels.sizes[0];
+        let mode = AddressMode::from(ground.config.address);
+        let line = |first: u32, count: u32, texels: u32| {
+            let first = (first * POSITION) as i32;
+            let line = first..first + (count * POSITION) as i32;
+            line.map(|at| mode.resolve(at, texels)).collect()
+        };
+        let of = |origin: &[u32; 2]| {
+            [
+                line(origin[0], self.size[0], width),
+                line(origin[1], self.size[1], height),
+            ]
+        };
+        self.origins.iter().map(of).collect()
+    }
+
     /// Texel `index` of a batch of `len`: the crops share the batch in equal runs.
-    fn texel(&self, ground: &Ground<'_>, stream: Stream, index: usize, len: usize) -> Texel {
+    pub(crate) fn texel(
+        &self,
+        ground: &Ground<'_>,
+        stream: Stream,
+        index: usize,
+        len: usize,
+    ) -> Texel {
         let drawn = |draw: u64| {
             let at = 4 * (index as u64 + draw * len as u64);
             self.place(

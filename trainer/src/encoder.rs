@@ -6,14 +6,15 @@
 //! [`crate::constructor`].
 //!
 //! Parameters live in one flat slice, so that they are updated, saved and restored like those of
-//! the synthesizer; burn holds them for the length of one pass.
+//! the synthesizer. [`crate::encoder_pass`] runs it on the processor; what is here runs it on burn's
+//! tensors, on any device.
 
 use crate::config::TrainConfig;
-use crate::error::TrainError;
+use crate::convolution::Sizes;
 use crate::random::Stream;
-use burn::tensor::module::conv2d;
-use burn::tensor::ops::ConvOptions;
-use burn::tensor::{Device, Tensor, TensorData, activation};
+use burn_tensor::module::conv2d;
+use burn_tensor::ops::ConvOptions;
+use burn_tensor::{Gradients, Tensor, activation};
 
 /// log2 of the encoder's reduction.
 pub(crate) const SCALE_LOG2: u8 = 3;
@@ -22,15 +23,12 @@ pub(crate) const SCALE_LOG2: u8 = 3;
 pub(crate) const RECEPTIVE: usize = 32;
 
 /// Residual blocks between two halvings.
-const BLOCKS: usize = 3;
+pub(crate) const BLOCKS: usize = 3;
 
 /// One convolution.
 #[derive(Clone, Copy, Debug)]
 struct Conv {
-    inputs: usize,
-    outputs: usize,
-    kernel: usize,
-    stride: usize,
+    sizes: Sizes,
     weights_at: usize,
     bias_at: usize,
 }
@@ -40,20 +38,6 @@ struct Conv {
 pub(crate) struct Encoder {
     convs: Vec<Conv>,
     pub(crate) parameters: usize,
-}
-
-/// A pass whose gradient can still be taken.
-pub(crate) struct Pass {
-    parameters: Vec<(Tensor<4>, Tensor<1>)>,
-    outputs: [Tensor<4>; 2],
-}
-
-fn values<const D: usize>(tensor: Tensor<D>) -> Result<Vec<f32>, TrainError> {
-    let data = tensor
-        .try_into_data()
-        .map_err(|e| TrainError::Engine(format!("{e:?}")))?;
-    data.try_into_vec()
-        .map_err(|e| TrainError::Engine(format!("{e:?}")))
 }
 
 impl Encoder {
@@ -86,10 +70,12 @@ impl Encoder {
         let bias_at = weights_at + outputs * inputs * kernel * kernel;
         self.parameters = bias_at + outputs;
         self.convs.push(Conv {
-            inputs,
-            outputs,
-            kernel,
-            stride,
+            sizes: Sizes {
+                inputs,
+                outputs,
+                kernel,
+                stride,
+            },
             weights_at,
             bias_at,
         });
@@ -100,7 +86,7 @@ impl Encoder {
     pub(crate) fn start(&self, stream: Stream) -> Vec<f32> {
         let mut parameters = vec![0.0; self.parameters];
         for (index, conv) in self.convs.iter().enumerate() {
-            let fan_in = (conv.inputs * conv.kernel * conv.kernel) as f32;
+            let fan_in = (conv.sizes.inputs * conv.sizes.kernel * conv.sizes.kernel) as f32;
             // Within a stage: the halving, then three convolutions for each block.
             let (stage, place) = (index / (1 + 3 * BLOCKS), index % (1 + 3 * BLOCKS));
             let ends_block = stage < 2 && place > 0 && place.is_multiple_of(3);
@@ -114,41 +100,16 @@ impl Encoder {
         parameters
     }
 
-    /// From images, `[item][channel][row][column]` with sides that are multiples of 8, to both
-    /// grids as [`Pass::grids`] describes them.
-    pub(crate) fn forward(
+    /// From images to both grids, given the weights and biases of every convolution.
+    pub(crate) fn run(
         &self,
-        parameters: &[f32],
-        images: Vec<f32>,
-        shape: [usize; 4],
-        tracked: bool,
-    ) -> Pass {
-        let device = if tracked {
-            Device::flex().autodiff()
-        } else {
-            Device::flex()
-        };
-        let parameters: Vec<(Tensor<4>, Tensor<1>)> = self
-            .convs
-            .iter()
-            .map(|c| {
-                let weights = parameters[c.weights_at..c.bias_at].to_vec();
-                let bias = parameters[c.bias_at..c.bias_at + c.outputs].to_vec();
-                let sides = [c.outputs, c.inputs, c.kernel, c.kernel];
-                let w = Tensor::<4>::from_data(TensorData::new(weights, sides), &device);
-                let b = Tensor::<1>::from_data(TensorData::new(bias, [c.outputs]), &device);
-                if tracked {
-                    (w.require_grad(), b.require_grad())
-                } else {
-                    (w, b)
-                }
-            })
-            .collect();
-        let images = Tensor::<4>::from_data(TensorData::new(images, shape), &device);
+        parameters: &[(Tensor<4>, Tensor<1>)],
+        images: Tensor<4>,
+    ) -> [Tensor<4>; 2] {
         // In 0..=1 an image is far from having mean zero, which is what the weights expect.
         let mut x = images * 2.0 - 1.0;
         let apply = |x: Tensor<4>, index: usize| {
-            let Conv { kernel, stride, .. } = self.convs[index];
+            let Sizes { kernel, stride, .. } = self.convs[index].sizes;
             let (w, b) = parameters[index].clone();
             let pad = kernel / 2;
             let options = ConvOptions::new([stride; 2], [pad; 2], [1; 2], 1);
@@ -166,53 +127,72 @@ impl Encoder {
         }
         let bottleneck = 2 * (1 + 3 * BLOCKS);
         let z = apply(x, bottleneck).tanh() * 0.5;
-        let outputs = [apply(z.clone(), bottleneck + 1), apply(z, bottleneck + 2)];
-        Pass {
-            parameters,
-            outputs,
-        }
+        [apply(z.clone(), bottleneck + 1), apply(z, bottleneck + 2)]
     }
 
-    /// The gradient of the parameters, given that of both grids in the layout of [`Pass::grids`].
-    pub(crate) fn backward(
-        &self,
-        pass: Pass,
-        gradients: [Vec<f32>; 2],
-    ) -> Result<Vec<f32>, TrainError> {
-        let Pass {
-            parameters,
-            outputs,
-        } = pass;
-        let [g0, g1] = gradients;
-        let [o0, o1] = outputs;
-        // The scalar product with a constant has that constant as its gradient: what the
-        // synthesizer computed outside burn enters burn's graph here.
-        let product = |output: Tensor<4>, gradient: Vec<f32>| {
-            let data = TensorData::new(gradient, output.dims());
-            let constant = Tensor::<4>::from_data(data, &output.device());
-            (output * constant).sum()
+    /// Where every convolution's weights start in the flat slice and their sides, then the same of
+    /// its biases: one after the other without a gap.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (usize, [usize; 4], usize, usize)> {
+        let place = |c: &Conv| {
+            let Sizes {
+                inputs,
+                outputs,
+                kernel,
+                ..
+            } = c.sizes;
+            (
+                c.weights_at,
+                [outputs, inputs, kernel, kernel],
+                c.bias_at,
+                outputs,
+            )
         };
-        let mut gradients = (product(o0, g0) + product(o1, g1)).backward();
-        let mut flat = vec![0.0; self.parameters];
-        for (conv, (w, b)) in self.convs.iter().zip(parameters) {
-            if let Some(gradient) = w.grad_remove(&mut gradients) {
-                flat[conv.weights_at..conv.bias_at].copy_from_slice(&values(gradient)?);
-            }
-            if let Some(gradient) = b.grad_remove(&mut gradients) {
-                let at = conv.bias_at;
-                flat[at..at + conv.outputs].copy_from_slice(&values(gradient)?);
-            }
-        }
-        Ok(flat)
+        self.convs.iter().map(place)
+    }
+
+    /// Convolutions.
+    pub(crate) const fn count(&self) -> usize {
+        self.convs.len()
+    }
+
+    /// The sizes of a convolution.
+    pub(crate) fn sizes(&self, index: usize) -> Sizes {
+        self.convs[index].sizes
+    }
+
+    /// The weights and the biases of a convolution.
+    pub(crate) fn parts<'a>(&self, index: usize, flat: &'a [f32]) -> (&'a [f32], &'a [f32]) {
+        let Conv {
+            weights_at,
+            bias_at,
+            sizes,
+        } = self.convs[index];
+        (
+            &flat[weights_at..bias_at],
+            &flat[bias_at..bias_at + sizes.outputs],
+        )
+    }
+
+    /// [`Encoder::parts`], to be changed.
+    pub(crate) fn parts_mut<'a>(
+        &self,
+        index: usize,
+        flat: &'a mut [f32],
+    ) -> (&'a mut [f32], &'a mut [f32]) {
+        let Conv {
+            weights_at,
+            bias_at,
+            sizes,
+        } = self.convs[index];
+        let (before, after) = flat.split_at_mut(bias_at);
+        (&mut before[weights_at..], &mut after[..sizes.outputs])
     }
 }
 
-impl Pass {
-    /// Both grids as reals, `[item][plane][row][column]` at 1/8 of the resolution, not yet limited
-    /// to the latents' range: level by level, channel by channel, and within a channel the cells of
-    /// a position in reading order.
-    pub(crate) fn grids(&self) -> Result<[Vec<f32>; 2], TrainError> {
-        let [o0, o1] = &self.outputs;
-        Ok([values(o0.clone())?, values(o1.clone())?])
-    }
+/// The way back from both grids, given their gradients.
+pub(crate) fn backward_from(outputs: [Tensor<4>; 2], gradients: [Tensor<4>; 2]) -> Gradients {
+    let ([o0, o1], [g0, g1]) = (outputs, gradients);
+    // The scalar product with a constant has that constant as its gradient: what was computed
+    // outside burn's graph enters it here.
+    ((o0 * g0).sum() + (o1 * g1).sum()).backward()
 }

@@ -94,6 +94,14 @@ pub enum TrainError {
         /// What the system said.
         cause: std::io::Error,
     },
+    /// The backend that was asked for cannot be had.
+    #[error("backend {backend}: {reason}")]
+    Backend {
+        /// Its name.
+        backend: &'static str,
+        /// Why not, and what would bring it.
+        reason: String,
+    },
     /// The trained parts do not form an asset.
     #[error("the trained parts do not form an asset: {0}")]
     Asset(#[from] ntmu_isa::AssetError),

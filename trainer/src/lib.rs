@@ -11,11 +11,12 @@
 //! |---|---|
 //! | [`Source`], [`TrainConfig`], [`Preset`] | what goes in |
 //! | `positions`, `sampler` | which inputs a texel has: isa's integer formulas, tabulated |
-//! | `encoder`, `constructor`, `crop` | latents from an encoder, level by level |
+//! | `encoder`, `convolution`, `constructor`, `crop` | latents from an encoder, level by level |
 //! | `topology`, `network`, `epilogue`, `tile`, `kernel` | the synthesizer, forward and backward |
 //! | `quantise`, `integer`, `half`, `calibrate` | the numbers of the decode that stand for it |
 //! | `export` | the asset |
 //! | `latents`, `adam`, `batch`, `engine`, `refine` | a step on the whole set |
+//! | [`TrainingDevice`], `graph`, `stepper` | the steps in reals on a GPU, through burn |
 //! | [`Plan`], [`Stage`], `schedule` | what is trained, in which order, how fast |
 //! | `train`, `run`, `budget`, `checkpoint`, `record`, `report` | the run |
 
@@ -30,13 +31,17 @@ mod checkpoint;
 mod choices;
 mod config;
 mod constructor;
+mod convolution;
 mod crop;
+mod device;
 mod encoder;
+mod encoder_pass;
 mod engine;
 mod epilogue;
 mod error;
 mod evaluate;
 mod export;
+mod graph;
 mod half;
 mod integer;
 mod kernel;
@@ -58,6 +63,7 @@ mod schedule;
 mod size;
 mod source;
 mod stage;
+mod stepper;
 mod texels;
 mod tile;
 mod topology;
@@ -67,6 +73,7 @@ pub use choices::{
     ActivationKind, Address, GridSampling, PYRAMIDS, Precision, Pyramid, Snap, WaveForm,
 };
 pub use config::{GridConfig, TrainConfig};
+pub use device::{Backend, TrainingDevice};
 pub use error::{Good, TrainError};
 pub use memory::Memory;
 pub use plan::{Arithmetic, Fall, Mips, Plan, RatesPlan, Shown, StagePlan, Train};

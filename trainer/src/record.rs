@@ -1,6 +1,7 @@
 //! Record: what the asset's metadata say of its making, nothing that differs between two equal runs.
 
 use crate::config::TrainConfig;
+use crate::device::{Backend, TrainingDevice};
 use crate::schedule::USUAL;
 use crate::stage::Stage;
 
@@ -16,8 +17,14 @@ pub(crate) fn steps(config: &TrainConfig, stages: &[Stage]) -> Vec<u64> {
     steps
 }
 
-/// The entries of the record; decibels of the network in reals and of the asset.
-pub(crate) fn of(config: &TrainConfig, stages: &[Stage], psnrs: [f64; 2]) -> Vec<(String, String)> {
+/// The entries of the record; decibels of the network in reals and of the asset. A device is named
+/// where it decides bytes.
+pub(crate) fn of(
+    config: &TrainConfig,
+    stages: &[Stage],
+    device: &TrainingDevice,
+    psnrs: [f64; 2],
+) -> Vec<(String, String)> {
     let grids = config
         .grids
         .map(|g| format!("{}ch@{}bit/{}", g.channels, g.bits, 1 << g.scale_log2));
@@ -47,6 +54,12 @@ pub(crate) fn of(config: &TrainConfig, stages: &[Stage], psnrs: [f64; 2]) -> Vec
         ("psnr_float", format!("{:.3}", psnrs[0])),
         ("psnr_quantised", format!("{:.3}", psnrs[1])),
     ];
+    match device.backend() {
+        Backend::Flex => {}
+        Backend::Wgpu | Backend::Vulkan | Backend::Cuda => {
+            entries.push(("backend", device.name()));
+        }
+    }
     if !config.weights.is_empty() {
         let weights = config.weights.iter().map(|(map, w)| format!("{map}={w}"));
         entries.push(("weights", weights.collect::<Vec<_>>().join(" ")));

@@ -1,6 +1,7 @@
 //! What a run tells while it works and when it is done.
 
 use crate::config::TrainConfig;
+use crate::device::Backend;
 use crate::stage::{Rates, Stage};
 use ntmu_isa::Asset;
 use serde::{Deserialize, Serialize};
@@ -91,6 +92,10 @@ pub struct TrainReport {
     pub reached: Option<bool>,
     /// The seed.
     pub seed: u64,
+    /// What computed the stages in reals, at the end of the run.
+    pub backend: Backend,
+    /// Its adapter; the processor has none.
+    pub adapter: Option<String>,
     /// The stages that ran.
     pub stages: Vec<StageReport>,
     /// The configuration.

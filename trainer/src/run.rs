@@ -2,7 +2,7 @@
 
 use crate::budget::Budget;
 use crate::checkpoint::{self, Position};
-use crate::engine::Engine;
+use crate::device::TrainingDevice;
 use crate::error::{Good, TrainError};
 use crate::evaluate::decibels;
 use crate::export;
@@ -13,6 +13,7 @@ use crate::record;
 use crate::report::{Progress, StageReport, TrainReport, Trained, Watch};
 use crate::sampler::Numbers;
 use crate::stage::Stage;
+use crate::stepper::Stepper;
 use ntmu_isa::Asset;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -44,6 +45,9 @@ pub(crate) struct Run<'a> {
     ground: Ground<'a>,
     model: Model,
     stages: Vec<Stage>,
+    device: &'a TrainingDevice,
+    /// Within a stage.
+    stepper: Option<Stepper>,
     position: Position,
     identity: u64,
     pub(crate) checkpoint: Option<&'a Path>,
@@ -64,13 +68,15 @@ impl<'a> Run<'a> {
         ground: Ground<'a>,
         model: Model,
         stages: Vec<Stage>,
-        position: Position,
-        identity: u64,
+        device: &'a TrainingDevice,
+        (position, identity): (Position, u64),
     ) -> Run<'a> {
         Run {
             ground,
             model,
             stages,
+            device,
+            stepper: None,
             earlier: position.seconds,
             position,
             identity,
@@ -88,7 +94,6 @@ impl<'a> Run<'a> {
         stop: &AtomicBool,
         watch: &mut dyn Watch,
     ) -> Result<(), TrainError> {
-        let mut engine: Option<Engine> = None;
         for index in self.position.stage..self.stages.len() {
             self.refit(index);
             let stage = self.stages[index];
@@ -100,16 +105,11 @@ impl<'a> Run<'a> {
             if self.position.step == 0 {
                 self.enter(&stage)?;
             }
-            if engine
-                .as_ref()
-                .is_none_or(|e| e.batch.texels.len() != stage.batch)
-            {
-                let channels = self.ground.texels.channels;
-                engine = Some(Engine::new(&self.ground.topology, stage.batch, channels));
-            }
-            if let Some(engine) = &mut engine {
-                self.steps(&stage, engine, stop, watch)?;
-            }
+            let stepper = Stepper::new(&self.ground, &self.model, &stage, self.device);
+            self.stepper = Some(stepper);
+            self.steps(&stage, stop, watch)?;
+            self.bring_back()?;
+            self.stepper = None;
             if stage.train == Train::Encoder && stage.steps > 0 {
                 self.model.encode_whole(&self.ground)?;
             }
@@ -167,13 +167,16 @@ impl<'a> Run<'a> {
     fn steps(
         &mut self,
         stage: &Stage,
-        engine: &mut Engine,
         stop: &AtomicBool,
         watch: &mut dyn Watch,
     ) -> Result<(), TrainError> {
         while self.position.step < stage.steps {
             if stop.load(Ordering::Relaxed) {
-                self.save()?;
+                self.read_losses(stage)?;
+                if let Some(path) = self.checkpoint {
+                    self.bring_back()?;
+                    self.save(path)?;
+                }
                 return Err(TrainError::Stopped {
                     stage: stage.name(),
                     step: self.position.step,
@@ -182,16 +185,14 @@ impl<'a> Run<'a> {
             }
             let step = self.position.step;
             let rates = stage.rates_at(step);
-            let (ground, model) = (&self.ground, &mut self.model);
-            let loss = match stage.train {
-                Train::Encoder => model.encoder_step(ground, engine, stage, step, rates)?,
-                Train::Latents | Train::Synthesizer => {
-                    model.step(ground, engine, stage, step, rates)
-                }
-            };
-            self.smooth(stage, loss)?;
+            if let Some(stepper) = &mut self.stepper {
+                stepper.step(&self.ground, &mut self.model, stage, step, rates)?;
+            }
             self.position.step = step + 1;
             self.position.seconds = self.earlier + self.started.elapsed().as_secs_f64();
+            if self.needs_losses(stage) {
+                self.read_losses(stage)?;
+            }
             self.after(stage, watch)?;
             if self.reached {
                 break;
@@ -200,8 +201,39 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    /// Whether the losses must be known after the step just taken. Reading them from a device waits
+    /// for it.
+    fn needs_losses(&self, stage: &Stage) -> bool {
+        let step = self.position.step;
+        !self.stepper.as_ref().is_some_and(Stepper::is_remote)
+            || self.is_observed(stage)
+            || self.is_measured(stage)
+            || step.is_multiple_of(self.ground.config.checkpoint_every)
+    }
+
+    /// Smooths the losses that were not read so far, of all steps up to the last.
+    fn read_losses(&mut self, stage: &Stage) -> Result<(), TrainError> {
+        let Some(stepper) = &mut self.stepper else {
+            return Ok(());
+        };
+        let losses = stepper.losses()?;
+        let first = self.position.step - losses.len() as u64;
+        for (step, loss) in (first..).zip(losses) {
+            self.smooth(stage, step, loss)?;
+        }
+        Ok(())
+    }
+
+    /// Brings what a device has changed back to the model.
+    fn bring_back(&mut self) -> Result<(), TrainError> {
+        match &self.stepper {
+            Some(stepper) => stepper.write_to(&mut self.model),
+            None => Ok(()),
+        }
+    }
+
     /// Takes a step's loss into the smoothed one, and refuses one that has run away.
-    fn smooth(&mut self, stage: &Stage, loss: f64) -> Result<(), TrainError> {
+    fn smooth(&mut self, stage: &Stage, step: u64, loss: f64) -> Result<(), TrainError> {
         let Position {
             loss: old, least, ..
         } = &mut self.position;
@@ -211,7 +243,7 @@ impl<'a> Run<'a> {
             *old + SMOOTHING * (loss - *old)
         };
         if !loss.is_finite() || (smooth > DIVERGED_FROM && smooth > DIVERGED * *least) {
-            return Err(self.diverged(stage, loss));
+            return Err(self.diverged(stage, step, loss));
         }
         *old = smooth;
         // Not a number before the first step.
@@ -219,10 +251,10 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    fn diverged(&self, stage: &Stage, loss: f64) -> TrainError {
+    fn diverged(&self, stage: &Stage, step: u64, loss: f64) -> TrainError {
         TrainError::Diverged {
             stage: stage.name(),
-            step: self.position.step,
+            step,
             loss,
             good: self.good.clone(),
         }
@@ -231,9 +263,8 @@ impl<'a> Run<'a> {
     /// What follows a step: measurements, words, a checkpoint.
     fn after(&mut self, stage: &Stage, watch: &mut dyn Watch) -> Result<(), TrainError> {
         let step = self.position.step;
-        let is_last = step == stage.steps;
         let deployed_psnr = self.measured(stage)?;
-        if step.is_multiple_of(OBSERVED) || is_last || deployed_psnr.is_some() {
+        if self.is_observed(stage) || deployed_psnr.is_some() {
             let progress = self.progress(stage, deployed_psnr);
             watch.observe(&progress);
             if watch.wants_asset() {
@@ -242,11 +273,13 @@ impl<'a> Run<'a> {
             }
         }
         let is_sound = self.position.loss <= DOUBTFUL * self.position.least;
-        if step.is_multiple_of(self.ground.config.checkpoint_every) && is_sound && !self.reached {
-            if self.checkpoint.is_some() && !checkpoint::is_finite(&self.model) {
-                return Err(self.diverged(stage, f64::NAN));
+        let saves = step.is_multiple_of(self.ground.config.checkpoint_every) && is_sound;
+        if let Some(path) = self.checkpoint.filter(|_| saves && !self.reached) {
+            self.bring_back()?;
+            if !checkpoint::is_finite(&self.model) {
+                return Err(self.diverged(stage, step, f64::NAN));
             }
-            self.save()?;
+            self.save(path)?;
         }
         Ok(())
     }
@@ -268,14 +301,25 @@ impl<'a> Run<'a> {
         }
     }
 
+    fn is_observed(&self, stage: &Stage) -> bool {
+        let step = self.position.step;
+        step.is_multiple_of(OBSERVED) || step == stage.steps
+    }
+
+    /// Whether there is a target and it is time to measure.
+    fn is_measured(&self, stage: &Stage) -> bool {
+        let passes = PASSES_BETWEEN * self.ground.texels.count() / stage.batch as u64;
+        let step = self.position.step;
+        self.ground.config.target_psnr.is_some()
+            && (step.is_multiple_of(passes.max(LEAST_BETWEEN)) || step == stage.steps)
+    }
+
     /// The asset's quality, where there is a target and it is time to measure.
     fn measured(&mut self, stage: &Stage) -> Result<Option<f64>, TrainError> {
         let Some(target) = self.ground.config.target_psnr else {
             return Ok(None);
         };
-        let passes = PASSES_BETWEEN * self.ground.texels.count() / stage.batch as u64;
-        let step = self.position.step;
-        if !step.is_multiple_of(passes.max(LEAST_BETWEEN)) && step != stage.steps {
+        if !self.is_measured(stage) {
             return Ok(None);
         }
         let psnr = self.as_deployed(stage, |model, ground| {
@@ -300,6 +344,7 @@ impl<'a> Run<'a> {
         stage: &Stage,
         look: impl FnOnce(&mut Model, &Ground<'_>) -> T,
     ) -> Result<T, TrainError> {
+        self.bring_back()?;
         if stage.train == Train::Encoder {
             self.model.encode_whole(&self.ground)?;
         }
@@ -312,10 +357,7 @@ impl<'a> Run<'a> {
         Ok(seen)
     }
 
-    fn save(&mut self) -> Result<(), TrainError> {
-        let Some(path) = self.checkpoint else {
-            return Ok(());
-        };
+    fn save(&mut self, path: &Path) -> Result<(), TrainError> {
         checkpoint::write(path, self.identity, &self.position, &self.model)?;
         self.good = Some(Good {
             path: path.to_owned(),
@@ -331,13 +373,14 @@ impl<'a> Run<'a> {
             ground,
             model,
             stages,
+            device,
             position,
             reports,
             ..
         } = self;
         let psnr_quantised = decibels(errors.overall());
         let psnrs = [position.psnr_float, psnr_quantised];
-        let record = record::of(ground.config, &stages, psnrs);
+        let record = record::of(ground.config, &stages, device, psnrs);
         let asset = asset_of(&model, &ground, record)?;
         let (width, height) = ground.texels.sizes[0];
         let texels = f64::from(width) * f64::from(height);
@@ -359,6 +402,8 @@ impl<'a> Run<'a> {
                 .target_psnr
                 .map(|target| psnr_quantised >= target),
             seed: ground.config.seed,
+            backend: device.backend(),
+            adapter: device.adapter().map(str::to_owned),
             stages: reports,
             config: ground.config.clone(),
         };

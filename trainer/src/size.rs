@@ -1,6 +1,7 @@
 //! Size: how large an asset will be, before it is trained.
 
 use crate::config::TrainConfig;
+use crate::device::TrainingDevice;
 use crate::error::TrainError;
 use crate::export;
 use crate::quantise::{Range, Widths, quantise};
@@ -20,12 +21,16 @@ const LONG: f64 = -1000.0;
 /// More steps than any stage may have have no more digits.
 const MOST_STEPS: u64 = 100_000_000;
 
-/// The bytes that the asset of this configuration has, or a few more: how many digits its record
-/// takes is not known before.
+/// The bytes that the asset of this configuration, trained on `device`, has, or a few more: how many
+/// digits its record takes is not known before.
 ///
 /// # Errors
 /// When the configuration or the set is refused.
-pub fn asset_bytes(source: &Source, config: &TrainConfig) -> Result<usize, TrainError> {
+pub fn asset_bytes(
+    source: &Source,
+    config: &TrainConfig,
+    device: &TrainingDevice,
+) -> Result<usize, TrainError> {
     config.validate()?;
     let topology = Topology::new(config, source.outputs.len());
     let ranges: Vec<Range> = (0..topology.layers.len().saturating_sub(1))
@@ -45,7 +50,7 @@ pub fn asset_bytes(source: &Source, config: &TrainConfig) -> Result<usize, Train
     for stage in &mut stages {
         stage.steps = stage.steps.max(MOST_STEPS);
     }
-    let record = record::of(config, &stages, [LONG; 2]);
+    let record = record::of(config, &stages, device, [LONG; 2]);
     let shape = export::shape_of(config, source)?;
     let grids = [0, 1].map(|grid| vec![0; shape.grid_latents(grid) as usize]);
     let asset = export::asset(config, source, layers, grids, record)?;

@@ -104,6 +104,11 @@ impl Texels {
         &self.mips[usize::from(mip)][at..at + self.channels]
     }
 
+    /// The texels of each mip, row by row, whole texels together.
+    pub(crate) fn mips(&self) -> &[Vec<f32>] {
+        &self.mips
+    }
+
     /// The value of each channel that has only one.
     pub(crate) fn constants(&self) -> Vec<Option<f32>> {
         let of = |channel: usize| {

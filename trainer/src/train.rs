@@ -3,6 +3,7 @@
 use crate::budget::Budget;
 use crate::checkpoint::{self, Position};
 use crate::config::TrainConfig;
+use crate::device::TrainingDevice;
 use crate::error::TrainError;
 use crate::model::{Ground, Model};
 use crate::plan::Train;
@@ -15,6 +16,9 @@ use std::time::Instant;
 
 /// Trains an asset for `source`.
 ///
+/// The stages in reals run on `device`; those in the decode's own numbers and the evaluations run on
+/// the processor. A run may be resumed on another device than it began on.
+///
 /// With `checkpoint`, the state is written there every [`TrainConfig::checkpoint_every`] steps and
 /// when `stop` becomes true. With `resume` as well, a run goes on from the file if it exists, and
 /// ends with the bytes that the uninterrupted run would have ended with. `observer` hears of every
@@ -26,6 +30,7 @@ use std::time::Instant;
 pub fn train(
     source: &Source,
     config: &TrainConfig,
+    device: &TrainingDevice,
     checkpoint: Option<&Path>,
     resume: bool,
     stop: &AtomicBool,
@@ -33,7 +38,15 @@ pub fn train(
 ) -> Result<Trained, TrainError> {
     // A closure watches; the compiler wants it said with a type of its own.
     let mut observer = observer;
-    watched(source, config, checkpoint, resume, stop, &mut observer)
+    watched(
+        source,
+        config,
+        device,
+        checkpoint,
+        resume,
+        stop,
+        &mut observer,
+    )
 }
 
 /// The same with a watcher, who can also ask for the asset as it stands.
@@ -43,6 +56,7 @@ pub fn train(
 pub fn watched(
     source: &Source,
     config: &TrainConfig,
+    device: &TrainingDevice,
     checkpoint: Option<&Path>,
     resume: bool,
     stop: &AtomicBool,
@@ -72,7 +86,7 @@ pub fn watched(
         }
         None => {
             if let Some(seconds) = config.seconds {
-                let fitted = Budget::fit(&ground, &model, &mut stages, seconds, started)?;
+                let fitted = Budget::fit(&ground, &model, &mut stages, device, (seconds, started))?;
                 budget = Some(fitted);
             }
             Position {
@@ -86,7 +100,7 @@ pub fn watched(
             }
         }
     };
-    let mut run = Run::new(ground, model, stages, position, identity);
+    let mut run = Run::new(ground, model, stages, device, (position, identity));
     run.checkpoint = checkpoint;
     run.budget = budget;
     run.all_stages(stop, watch)?;

@@ -2,7 +2,9 @@
 
 use super::{Encode, smaller};
 use anyhow::Context as _;
-use ntmu::trainer::{EFFORTS, PYRAMIDS, Plan, Precision, Preset, Source, TrainConfig};
+use ntmu::trainer::{
+    EFFORTS, PYRAMIDS, Plan, Precision, Preset, Source, TrainConfig, TrainingDevice,
+};
 use std::path::Path;
 
 impl Encode {
@@ -43,6 +45,7 @@ impl Encode {
         &self,
         source: &Source,
         mut config: TrainConfig,
+        device: &TrainingDevice,
     ) -> anyhow::Result<TrainConfig> {
         if self.no_encoder {
             config.plan = Some(config.plan_for(&source.sizes()).without_encoder());
@@ -56,7 +59,7 @@ impl Encode {
             config.plan = Some(config.plan_for(&source.sizes()).with_steps(&steps)?);
         }
         if let Some(most) = self.max_bytes {
-            config = smaller::fitted(source, config, most)?;
+            config = smaller::fitted(source, config, device, most)?;
         }
         config.validate()?;
         Ok(config)

@@ -1,13 +1,14 @@
 //! Smaller: grids with fewer channels or bits, until the asset fits.
 
 use crate::console;
-use ntmu::trainer::{Source, TrainConfig, TrainError, asset_bytes};
+use ntmu::trainer::{Source, TrainConfig, TrainError, TrainingDevice, asset_bytes};
 
 /// The configuration with as many channels of its grids as fit `most` bytes, in the proportion that
 /// they had; with fewer bits only where a single channel of the configured ones is too much.
 pub(super) fn fitted(
     source: &Source,
     config: TrainConfig,
+    device: &TrainingDevice,
     most: u64,
 ) -> anyhow::Result<TrainConfig> {
     let [first, second] = config.grids.map(|grid| grid.channels);
@@ -25,7 +26,7 @@ pub(super) fn fitted(
             config
         };
         let bytes = |share: u16| -> Result<u64, TrainError> {
-            Ok(asset_bytes(source, &with(share))? as u64)
+            Ok(asset_bytes(source, &with(share), device)? as u64)
         };
         smallest = smallest.min(bytes(1)?);
         // More channels are never smaller: the most that fit lie just below the first that do not.

@@ -9,7 +9,7 @@ use ntmu::built_in;
 use ntmu::decoded::Decoded;
 use ntmu::quality::{self, Quality};
 use ntmu::texture_set::TextureSet;
-use ntmu::trainer::{self, Memory, TrainError};
+use ntmu::trainer::{self, Backend, Memory, TrainError};
 use ntmu::training_source::training_source;
 use std::path::Path;
 use std::sync::Arc;
@@ -19,6 +19,10 @@ use std::time::Instant;
 impl Encode {
     pub(crate) fn run(self, json: bool) -> anyhow::Result<Verdict> {
         let config = self.config()?;
+        let device = Backend::by_name(&self.backend)?.open()?;
+        if let Some(adapter) = device.adapter() {
+            console::note(&format!("{}: {adapter}", device.backend().name()));
+        }
         let set = match &self.source {
             Some(path) if !self.built_in => TextureSet::read(path)?,
             _ => built_in::source(),
@@ -32,7 +36,7 @@ impl Encode {
         // The largest thing in memory, and no longer needed.
         drop(set);
         self.prepare(&mut source)?;
-        let config = self.config_for(&source, config)?;
+        let config = self.config_for(&source, config, &device)?;
         let memory = Memory::of(&source, &config)?;
         let started = Instant::now();
         let stop = stop_on_interrupt()?;
@@ -40,6 +44,7 @@ impl Encode {
         let trained = trainer::watched(
             &source,
             &config,
+            &device,
             Some(&checkpoint),
             self.resume,
             &stop,

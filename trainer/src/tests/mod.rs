@@ -9,14 +9,14 @@ mod pyramids;
 mod runs;
 mod safety;
 
-use crate::{GridConfig, Plan, Source, TrainConfig, TrainError, Trained, train};
+use crate::{GridConfig, Plan, Source, TrainConfig, TrainError, Trained, TrainingDevice, train};
 use ndarray::Array3;
 use ntmu_isa::asset::{Encoding, Map};
 use ntmu_isa::shape::OutputFormat;
 use std::sync::atomic::AtomicBool;
 
 /// A set with a gradient, a checkerboard, a constant channel and one of sixteen bits.
-fn source(width: usize, height: usize, mips: usize) -> Source {
+pub(crate) fn source(width: usize, height: usize, mips: usize) -> Source {
     let outputs = vec![
         OutputFormat::Unorm8,
         OutputFormat::Unorm8,
@@ -57,7 +57,7 @@ fn usual(steps: [u64; 3]) -> Plan {
     TrainConfig::default().usual_plan(steps)
 }
 
-fn small() -> TrainConfig {
+pub(crate) fn small() -> TrainConfig {
     TrainConfig {
         grids: [
             GridConfig {
@@ -86,6 +86,7 @@ fn run(source: &Source, config: &TrainConfig) -> Result<Trained, TrainError> {
     train(
         source,
         config,
+        &TrainingDevice::flex(),
         None,
         false,
         &AtomicBool::new(false),

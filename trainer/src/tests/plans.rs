@@ -130,7 +130,16 @@ fn a_target_that_is_reached_ends_the_run_and_one_that_is_not_is_said() {
             seen.push((p.done, psnr));
         }
     };
-    let reached = crate::train(&source, &with(18.0), None, false, &stop, &mut observer).unwrap();
+    let reached = crate::train(
+        &source,
+        &with(18.0),
+        &crate::TrainingDevice::flex(),
+        None,
+        false,
+        &stop,
+        &mut observer,
+    )
+    .unwrap();
     assert_eq!(reached.report.reached, Some(true));
     let (done, psnr) = *seen.last().unwrap();
     // What was measured is what was written.

@@ -10,7 +10,10 @@ use crate::latents::Rounding;
 use crate::model::{Ground, Model};
 use crate::network::Network;
 use crate::sampler::{Numbers, Texel, Window};
-use crate::{Address, GridSampling, Preset, Pyramid, Snap, Source, TrainConfig, TrainError, train};
+use crate::{
+    Address, GridSampling, Preset, Pyramid, Snap, Source, TrainConfig, TrainError, TrainingDevice,
+    train,
+};
 use ntmu_isa::position::AxisPosition;
 use ntmu_isa::shape::Shape;
 use std::collections::BTreeSet;
@@ -318,7 +321,16 @@ fn of_every_stage(pyramid: Pyramid) -> TrainConfig {
 fn stopped_at(source: &Source, config: &TrainConfig, path: &std::path::Path, at: u64) {
     let stop = AtomicBool::new(false);
     let mut observer = |p: &crate::Progress| stop.store(p.done >= at, Ordering::Relaxed);
-    let error = train(source, config, Some(path), true, &stop, &mut observer).unwrap_err();
+    let error = train(
+        source,
+        config,
+        &TrainingDevice::flex(),
+        Some(path),
+        true,
+        &stop,
+        &mut observer,
+    )
+    .unwrap_err();
     assert!(matches!(error, TrainError::Stopped { .. }), "{error}");
 }
 
@@ -334,7 +346,16 @@ fn a_pyramid_stopped_in_every_stage_and_resumed_equals_the_uninterrupted_run() {
             stopped_at(&source, &config, &path, at);
         }
         let stop = AtomicBool::new(false);
-        let resumed = train(&source, &config, Some(&path), true, &stop, &mut |_| {}).unwrap();
+        let resumed = train(
+            &source,
+            &config,
+            &TrainingDevice::flex(),
+            Some(&path),
+            true,
+            &stop,
+            &mut |_| {},
+        )
+        .unwrap();
         assert_eq!(resumed.asset, whole.asset);
     }
 }

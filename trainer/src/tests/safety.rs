@@ -3,7 +3,7 @@
 use super::{run, small, source, usual};
 use crate::checkpoint;
 use crate::model::{Ground, Model};
-use crate::{Plan, Source, TrainConfig, TrainError, train};
+use crate::{Plan, Source, TrainConfig, TrainError, TrainingDevice, train};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -19,7 +19,16 @@ fn stopped_at(
     let mut observer = |p: &crate::Progress| {
         stop.store(p.done >= at, std::sync::atomic::Ordering::Relaxed);
     };
-    train(source, config, Some(path), resume, &stop, &mut observer).unwrap_err()
+    train(
+        source,
+        config,
+        &TrainingDevice::flex(),
+        Some(path),
+        resume,
+        &stop,
+        &mut observer,
+    )
+    .unwrap_err()
 }
 
 #[test]
@@ -42,7 +51,16 @@ fn a_run_stopped_in_every_stage_and_resumed_equals_the_uninterrupted_run() {
         resume = true;
     }
     let stop = AtomicBool::new(false);
-    let resumed = train(&source, &config, Some(&path), true, &stop, &mut |_| {}).unwrap();
+    let resumed = train(
+        &source,
+        &config,
+        &TrainingDevice::flex(),
+        Some(&path),
+        true,
+        &stop,
+        &mut |_| {},
+    )
+    .unwrap();
     assert_eq!(resumed.asset, whole.asset);
     assert_eq!(
         resumed.report.psnr_float.to_bits(),
@@ -57,12 +75,29 @@ fn a_foreign_a_damaged_and_a_truncated_checkpoint_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
     let stop = AtomicBool::new(true);
-    train(&source, &config, Some(&path), false, &stop, &mut |_| {}).unwrap_err();
+    train(
+        &source,
+        &config,
+        &TrainingDevice::flex(),
+        Some(&path),
+        false,
+        &stop,
+        &mut |_| {},
+    )
+    .unwrap_err();
     let good = std::fs::read(&path).unwrap();
     let stop = AtomicBool::new(false);
     let resumed = |config: &TrainConfig, bytes: &[u8]| {
         std::fs::write(&path, bytes).unwrap();
-        train(&source, config, Some(&path), true, &stop, &mut |_| {})
+        train(
+            &source,
+            config,
+            &TrainingDevice::flex(),
+            Some(&path),
+            true,
+            &stop,
+            &mut |_| {},
+        )
     };
     let other = resumed(
         &TrainConfig {
@@ -131,18 +166,30 @@ fn a_loss_that_is_no_number_names_its_step() {
     model.start_encoder(&ground);
     checkpoint::write(&path, identity, &position, &model).unwrap();
     let stop = AtomicBool::new(false);
-    let error = train(&source, &config, Some(&path), true, &stop, &mut |_| {}).unwrap_err();
-    assert!(
-        matches!(
-            error,
-            TrainError::Diverged {
-                stage: "latents",
-                step: 5,
-                ..
-            }
-        ),
-        "{error}"
-    );
+    // A device's losses are read together, some steps later.
+    for device in [TrainingDevice::flex(), TrainingDevice::graph_on_flex()] {
+        let error = train(
+            &source,
+            &config,
+            &device,
+            Some(&path),
+            true,
+            &stop,
+            &mut |_| {},
+        )
+        .unwrap_err();
+        assert!(
+            matches!(
+                error,
+                TrainError::Diverged {
+                    stage: "latents",
+                    step: 5,
+                    ..
+                }
+            ),
+            "{error}"
+        );
+    }
 }
 
 /// A plan with a stage of every kind.
@@ -197,7 +244,16 @@ fn a_run_of_every_kind_of_stage_stopped_in_each_and_resumed_equals_the_uninterru
         stopped_at(&source, &config, &path, at, resume);
     }
     let stop = AtomicBool::new(false);
-    let resumed = train(&source, &config, Some(&path), true, &stop, &mut |_| {}).unwrap();
+    let resumed = train(
+        &source,
+        &config,
+        &TrainingDevice::flex(),
+        Some(&path),
+        true,
+        &stop,
+        &mut |_| {},
+    )
+    .unwrap();
     assert_eq!(resumed.asset, whole.asset);
 }
 
@@ -232,7 +288,16 @@ fn a_run_that_diverges_stops_and_names_the_last_checkpoint_from_before() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
     let stop = AtomicBool::new(false);
-    let error = train(&source, &config, Some(&path), false, &stop, &mut |_| {}).unwrap_err();
+    let error = train(
+        &source,
+        &config,
+        &TrainingDevice::flex(),
+        Some(&path),
+        false,
+        &stop,
+        &mut |_| {},
+    )
+    .unwrap_err();
     let TrainError::Diverged { good, .. } = &error else {
         panic!("{error}");
     };
@@ -247,7 +312,16 @@ fn a_run_that_diverges_stops_and_names_the_last_checkpoint_from_before() {
         rate_factor: 1e-3,
         ..config
     };
-    train(&source, &gentle, Some(&path), true, &stop, &mut |_| {}).unwrap();
+    train(
+        &source,
+        &gentle,
+        &TrainingDevice::flex(),
+        Some(&path),
+        true,
+        &stop,
+        &mut |_| {},
+    )
+    .unwrap();
 }
 
 #[test]
@@ -262,7 +336,16 @@ fn a_checkpoint_that_cannot_be_written_stops_the_run_and_leaves_nothing() {
         ..small()
     };
     let stop = AtomicBool::new(false);
-    let error = train(&source, &config, Some(&path), false, &stop, &mut |_| {}).unwrap_err();
+    let error = train(
+        &source,
+        &config,
+        &TrainingDevice::flex(),
+        Some(&path),
+        false,
+        &stop,
+        &mut |_| {},
+    )
+    .unwrap_err();
     assert!(
         matches!(&error, TrainError::Io { path: p, .. } if *p == path),
         "{error}"
