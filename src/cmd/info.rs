@@ -96,7 +96,7 @@ fn levels(shape: &Shape) -> impl Iterator<Item = (u8, RangeInclusive<u8>)> {
     (0..shape.level_count()).filter_map(move |level| {
         let mut served = mips().filter(|&mip| pyramid.level_of(mip) == level);
         let first = served.next()?;
-        Some((level, first..=served.last().unwrap_or(first)))
+        Some((level, first..=served.next_back().unwrap_or(first)))
     })
 }
 
