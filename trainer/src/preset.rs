@@ -80,7 +80,7 @@ impl Preset {
             encoder_rate: 1e-3,
             latent_rate: 0.01,
             // A wider layer moves further at the same rate, and so does a deeper network: with four
-            // blocks of 64 a rate of 0.02 costs 0.3 dB, and may run away in a long run.
+            // blocks of 64 a rate of 0.02 costs 0.3 dB, and may run away in a long run (DESIGN).
             synthesizer_rate: match (self.residual_blocks, self.hidden.iter().any(|&w| w > 64)) {
                 (3.., _) => 0.005,
                 (_, true) => 0.01,
