@@ -13,7 +13,8 @@ use crate::{GridConfig, Plan, Source, TrainConfig, TrainError, Trained, Training
 use ndarray::Array3;
 use ntmu_isa::asset::{Encoding, Map};
 use ntmu_isa::shape::OutputFormat;
-use std::sync::atomic::AtomicBool;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A set with a gradient, a checkerboard, a constant channel and one of sixteen bits.
 pub(crate) fn source(width: usize, height: usize, mips: usize) -> Source {
@@ -92,4 +93,41 @@ fn run(source: &Source, config: &TrainConfig) -> Result<Trained, TrainError> {
         &AtomicBool::new(false),
         &mut |_| {},
     )
+}
+
+/// A run with its checkpoints at `path`, from the one that is there.
+fn resumed(source: &Source, config: &TrainConfig, path: &Path) -> Result<Trained, TrainError> {
+    train(
+        source,
+        config,
+        &TrainingDevice::flex(),
+        Some(path),
+        true,
+        &AtomicBool::new(false),
+        &mut |_| {},
+    )
+}
+
+/// Why a run ends that is stopped after `at` steps.
+fn stopped_at(
+    source: &Source,
+    config: &TrainConfig,
+    path: &Path,
+    at: u64,
+    resume: bool,
+) -> TrainError {
+    let stop = AtomicBool::new(false);
+    let mut observer = |p: &crate::Progress| {
+        stop.store(p.done >= at, Ordering::Relaxed);
+    };
+    train(
+        source,
+        config,
+        &TrainingDevice::flex(),
+        Some(path),
+        resume,
+        &stop,
+        &mut observer,
+    )
+    .unwrap_err()
 }

@@ -1,7 +1,7 @@
 //! Grids that are a pyramid.
 
 use super::by_isa::corners;
-use super::{run, small, source, usual};
+use super::{resumed, run, small, source, stopped_at, usual};
 use crate::batch::all_texels;
 use crate::engine::{Engine, View};
 use crate::evaluate::evaluate;
@@ -10,14 +10,10 @@ use crate::latents::Rounding;
 use crate::model::{Ground, Model};
 use crate::network::Network;
 use crate::sampler::{Numbers, Texel, Window};
-use crate::{
-    Address, GridSampling, Preset, Pyramid, Snap, Source, TrainConfig, TrainError, TrainingDevice,
-    train,
-};
+use crate::{Address, GridSampling, Preset, Pyramid, Snap, TrainConfig, TrainError};
 use ntmu_isa::position::AxisPosition;
 use ntmu_isa::shape::Shape;
 use std::collections::BTreeSet;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 fn pyramids() -> [Pyramid; 5] {
     [
@@ -318,22 +314,6 @@ fn of_every_stage(pyramid: Pyramid) -> TrainConfig {
     }
 }
 
-fn stopped_at(source: &Source, config: &TrainConfig, path: &std::path::Path, at: u64) {
-    let stop = AtomicBool::new(false);
-    let mut observer = |p: &crate::Progress| stop.store(p.done >= at, Ordering::Relaxed);
-    let error = train(
-        source,
-        config,
-        &TrainingDevice::flex(),
-        Some(path),
-        true,
-        &stop,
-        &mut observer,
-    )
-    .unwrap_err();
-    assert!(matches!(error, TrainError::Stopped { .. }), "{error}");
-}
-
 #[test]
 fn a_pyramid_stopped_in_every_stage_and_resumed_equals_the_uninterrupted_run() {
     let source = source(80, 72, 6);
@@ -343,19 +323,10 @@ fn a_pyramid_stopped_in_every_stage_and_resumed_equals_the_uninterrupted_run() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.checkpoint");
         for at in [20, 40, 80] {
-            stopped_at(&source, &config, &path, at);
+            let error = stopped_at(&source, &config, &path, at, true);
+            assert!(matches!(error, TrainError::Stopped { .. }), "{error}");
         }
-        let stop = AtomicBool::new(false);
-        let resumed = train(
-            &source,
-            &config,
-            &TrainingDevice::flex(),
-            Some(&path),
-            true,
-            &stop,
-            &mut |_| {},
-        )
-        .unwrap();
+        let resumed = resumed(&source, &config, &path).unwrap();
         assert_eq!(resumed.asset, whole.asset);
     }
 }

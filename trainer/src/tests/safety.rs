@@ -1,35 +1,10 @@
 //! Safety: a run that is interrupted, that diverges, or whose files are not its own.
 
-use super::{run, small, source, usual};
+use super::{resumed, run, small, source, stopped_at, usual};
 use crate::checkpoint;
 use crate::model::{Ground, Model};
-use crate::{Plan, Source, TrainConfig, TrainError, TrainingDevice, train};
-use std::path::Path;
+use crate::{Plan, TrainConfig, TrainError, TrainingDevice, train};
 use std::sync::atomic::AtomicBool;
-
-/// Stops a run at its `at`-th observation.
-fn stopped_at(
-    source: &Source,
-    config: &TrainConfig,
-    path: &Path,
-    at: u64,
-    resume: bool,
-) -> TrainError {
-    let stop = AtomicBool::new(false);
-    let mut observer = |p: &crate::Progress| {
-        stop.store(p.done >= at, std::sync::atomic::Ordering::Relaxed);
-    };
-    train(
-        source,
-        config,
-        &TrainingDevice::flex(),
-        Some(path),
-        resume,
-        &stop,
-        &mut observer,
-    )
-    .unwrap_err()
-}
 
 #[test]
 fn a_run_stopped_in_every_stage_and_resumed_equals_the_uninterrupted_run() {
@@ -50,17 +25,7 @@ fn a_run_stopped_in_every_stage_and_resumed_equals_the_uninterrupted_run() {
         );
         resume = true;
     }
-    let stop = AtomicBool::new(false);
-    let resumed = train(
-        &source,
-        &config,
-        &TrainingDevice::flex(),
-        Some(&path),
-        true,
-        &stop,
-        &mut |_| {},
-    )
-    .unwrap();
+    let resumed = resumed(&source, &config, &path).unwrap();
     assert_eq!(resumed.asset, whole.asset);
     assert_eq!(
         resumed.report.psnr_float.to_bits(),
@@ -243,17 +208,7 @@ fn a_run_of_every_kind_of_stage_stopped_in_each_and_resumed_equals_the_uninterru
     for (at, resume) in [(20, false), (45, true), (70, true), (95, true), (120, true)] {
         stopped_at(&source, &config, &path, at, resume);
     }
-    let stop = AtomicBool::new(false);
-    let resumed = train(
-        &source,
-        &config,
-        &TrainingDevice::flex(),
-        Some(&path),
-        true,
-        &stop,
-        &mut |_| {},
-    )
-    .unwrap();
+    let resumed = resumed(&source, &config, &path).unwrap();
     assert_eq!(resumed.asset, whole.asset);
 }
 
