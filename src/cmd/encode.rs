@@ -105,9 +105,9 @@ pub(crate) struct Encode {
     /// Bits of an activation instead of the preset's.
     #[arg(long, value_name = "BITS")]
     activation_bits: Option<u8>,
-    /// Bits of a weight instead of the preset's.
-    #[arg(long, value_name = "BITS")]
-    weight_bits: Option<u8>,
+    /// Bits of a weight instead of the preset's; or of every layer's, first layer first, `8,4,4,8`.
+    #[arg(long, value_delimiter = ',', num_args = 1, value_name = "BITS")]
+    weight_bits: Option<Vec<u8>>,
 }
 
 #[cfg(not(feature = "train"))]

@@ -5,8 +5,14 @@ use crate::texture_set::TextureSet;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-/// Raised when a change makes points come out otherwise that their configuration does not tell.
-pub const EVALUATION: u32 = 1;
+/// Raised when a change makes points of a codec come out otherwise that their configuration does not
+/// tell, as another default of training does.
+const fn evaluation(codec: &Codec) -> u32 {
+    match codec {
+        Codec::Neural(_) => 2,
+        Codec::Astc { .. } | Codec::Bc { .. } => 1,
+    }
+}
 
 /// Hexadecimal digits of an identity: 64 bits.
 const DIGITS: usize = 16;
@@ -43,7 +49,7 @@ pub fn fingerprint(set: &TextureSet) -> String {
 #[must_use]
 pub fn identity(fingerprint: &str, codec: &Codec) -> String {
     let content = Content {
-        evaluation: EVALUATION,
+        evaluation: evaluation(codec),
         ntmu: env!("CARGO_PKG_VERSION"),
         set: fingerprint,
         codec,

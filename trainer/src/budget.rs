@@ -9,12 +9,14 @@ use crate::error::TrainError;
 use crate::model::{Ground, Model};
 use crate::plan::Train;
 use crate::sampler::Numbers;
+use crate::schedule;
 use crate::stage::Stage;
 use crate::stepper::Stepper;
 use std::time::Instant;
 
-/// The share of the time that goes to measuring how long a step of a stage takes, over all stages.
-const MEASURING: f64 = 0.08;
+/// The share of the time that goes to measuring how long a step of a stage takes, over all stages;
+/// twice that where the batch changes.
+const MEASURING: f64 = 0.04;
 
 /// The most seconds that one stage is measured for.
 const MOST: f64 = 10.0;
@@ -45,6 +47,9 @@ pub(crate) struct Budget {
 impl Budget {
     /// Measures every stage, and scales the steps of all by one factor, so that the run ends
     /// `seconds` after `started`, evaluation included. A stage of any steps keeps at least one.
+    ///
+    /// Where the plan follows from an effort, a short time gets smaller batches, and the stages are
+    /// measured again with them.
     pub(crate) fn fit(
         ground: &Ground<'_>,
         model: &Model,
@@ -56,15 +61,46 @@ impl Budget {
         let evaluation = Instant::now();
         scratch.evaluate(ground, Numbers::Real);
         let ending = evaluation.elapsed().as_secs_f64();
+        let mut budget = Budget {
+            seconds,
+            costs: Vec::new(),
+            ending,
+        };
+        let mut factor = budget.measure(ground, &mut scratch, stages, device, started)?;
+        if schedule::follows_effort(ground.config) {
+            let drawn = |stage: &Stage| stage.steps as f64 * stage.batch as f64;
+            let texels: f64 = stages.iter().map(drawn).sum();
+            let batch = schedule::batch_of_run((factor.max(0.0) * texels) as u64);
+            if stages.iter().any(|stage| stage.batch > batch) {
+                for stage in stages.iter_mut().filter(|stage| stage.batch > batch) {
+                    stage.steps = (drawn(stage) / batch as f64).round() as u64;
+                    stage.batch = batch;
+                }
+                factor = budget.measure(ground, &mut scratch, stages, device, started)?;
+            }
+        }
+        budget.scale(stages, 0, factor);
+        Ok(budget)
+    }
+
+    /// Measures a step of every stage; the factor by which the steps then fit the time left.
+    fn measure(
+        &mut self,
+        ground: &Ground<'_>,
+        scratch: &mut Model,
+        stages: &[Stage],
+        device: &TrainingDevice,
+        started: Instant,
+    ) -> Result<f64, TrainError> {
         // What happens once between stages: the first look at the set, the encoding of it, the
         // ranges of the registers.
-        let mut between = ending;
+        let mut between = self.ending;
         let running = stages.iter().filter(|s| s.steps > 0).count().max(1);
-        let share = (MEASURING * seconds / running as f64).min(MOST);
-        let mut costs = Vec::with_capacity(stages.len());
-        for stage in stages.iter() {
+        let share = (MEASURING * self.seconds / running as f64).min(MOST);
+        self.costs.clear();
+        for stage in stages {
             if stage.steps == 0 {
-                costs.push(0.0);
+                self.costs.push(0.0);
                 continue;
             }
             let preparing = Instant::now();
@@ -75,17 +111,11 @@ impl Budget {
                 scratch.calibrate(ground);
             }
             between += preparing.elapsed().as_secs_f64();
-            costs.push(seconds_of_step(ground, &mut scratch, stage, device, share)?);
+            let cost = seconds_of_step(ground, scratch, stage, device, share)?;
+            self.costs.push(cost);
         }
-        let budget = Budget {
-            seconds,
-            costs,
-            ending,
-        };
-        let left = budget.left(started.elapsed().as_secs_f64()) - between;
-        let factor = left / budget.cost(stages, 0);
-        budget.scale(stages, 0, factor);
-        Ok(budget)
+        let left = self.left(started.elapsed().as_secs_f64()) - between;
+        Ok(left / self.cost(stages, 0))
     }
 
     /// Fits the stages from `next` on again, after `spent` seconds, now that the stage before is

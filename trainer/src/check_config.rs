@@ -71,14 +71,30 @@ impl TrainConfig {
         }
         let (low, high) = limits::WEIGHT_BITS;
         range("weight_bits", self.weight_bits, low, high)?;
-        match &self.precision_per_layer {
-            Some(list) if list.len() != layers => Err(TrainError::config(
-                "precision_per_layer",
-                format!("{} layers", list.len()),
-                layers.to_string(),
-            )),
-            Some(_) | None => Ok(()),
+        let listed = self.weight_bits_per_layer.iter().flatten();
+        for (layer, &bits) in listed.enumerate() {
+            range(format!("weight_bits_per_layer[{layer}]"), bits, low, high)?;
         }
+        let lists = [
+            (
+                "precision_per_layer",
+                self.precision_per_layer.as_ref().map(Vec::len),
+            ),
+            (
+                "weight_bits_per_layer",
+                self.weight_bits_per_layer.as_ref().map(Vec::len),
+            ),
+        ];
+        for (field, length) in lists {
+            match length {
+                Some(length) if length != layers => {
+                    let found = format!("{length} layers");
+                    return Err(TrainError::config(field, found, layers.to_string()));
+                }
+                Some(_) | None => {}
+            }
+        }
+        Ok(())
     }
 
     /// Whether training holds every number of the decode exactly, and the layers' registers fit.
@@ -94,7 +110,9 @@ impl TrainConfig {
             let reads_halves = index > 0 && topology.writes_halves(index - 1);
             if !reads_halves {
                 let most = match layer.precision {
-                    Precision::Int8 => exact_bits(layer.inputs, self.weight_bits, index == 0),
+                    Precision::Int8 => {
+                        exact_bits(layer.inputs, self.weight_bits_of(index), index == 0)
+                    }
                     // An activation without its zero point has one bit more.
                     Precision::Fp16 => BITS_OF_HALF - u8::from(index > 0),
                 };

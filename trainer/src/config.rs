@@ -63,6 +63,8 @@ pub struct TrainConfig {
     pub input_bits: u8,
     /// Bits of an integer layer's weight, 2..=8.
     pub weight_bits: u8,
+    /// Those of each layer, first layer first, in the place of `weight_bits`.
+    pub weight_bits_per_layer: Option<Vec<u8>>,
     /// Bits of an activation between two layers of which one is of integers, 4..=16 as far as sums
     /// stay exact in training: 8 at any width, more in narrow layers.
     pub activation_bits: u8,
@@ -149,6 +151,14 @@ impl TrainConfig {
         listed
             .and_then(|list| list.get(layer).copied())
             .unwrap_or(self.precision)
+    }
+
+    /// The bits of a layer's weights; the configuration is valid.
+    pub(crate) fn weight_bits_of(&self, layer: usize) -> u8 {
+        let listed = self.weight_bits_per_layer.as_ref();
+        listed
+            .and_then(|list| list.get(layer).copied())
+            .unwrap_or(self.weight_bits)
     }
 
     /// The shape of grid `grid`; the configuration is valid.

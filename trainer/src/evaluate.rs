@@ -7,6 +7,7 @@ use crate::engine::View;
 use crate::sampler::Texel;
 use crate::tile::Workspace;
 use crate::topology::Topology;
+use ntmu_isa::shape::OutputFormat;
 use rayon::prelude::*;
 
 /// Tiles of one task.
@@ -46,8 +47,13 @@ pub(crate) fn decibels(mean_squared_error: f64) -> f64 {
     -10.0 * mean_squared_error.log10()
 }
 
-/// The error of every texel under `view` that is not masked out.
-pub(crate) fn evaluate(topology: &Topology, view: View<'_>) -> Errors {
+/// The error over every texel that is not masked out. With `stored`, what a network in reals puts
+/// out is rounded to the codes of these formats, as in the numbers of the decode it is anyway.
+pub(crate) fn evaluate(
+    topology: &Topology,
+    stored: Option<&[OutputFormat]>,
+    view: View<'_>,
+) -> Errors {
     let sizes = &view.texels.sizes;
     let channels = view.texels.channels;
     let mut texels: Vec<Texel> = all_texels(sizes).collect();
@@ -60,7 +66,7 @@ pub(crate) fn evaluate(topology: &Topology, view: View<'_>) -> Errors {
                 let mut sums = vec![0.0; channels * sizes.len()];
                 for tile in texels.chunks(TILE) {
                     forward(view, workspace, tile);
-                    add_errors(view, workspace, tile, &mut sums);
+                    add_errors(stored, view, workspace, tile, &mut sums);
                 }
                 sums
             },
@@ -80,7 +86,13 @@ pub(crate) fn evaluate(topology: &Topology, view: View<'_>) -> Errors {
     }
 }
 
-fn add_errors(view: View<'_>, workspace: &Workspace, tile: &[Texel], sums: &mut [f64]) {
+fn add_errors(
+    stored: Option<&[OutputFormat]>,
+    view: View<'_>,
+    workspace: &Workspace,
+    tile: &[Texel],
+    sums: &mut [f64],
+) {
     let channels = view.texels.channels;
     let Some(last) = view.network.layers.last() else {
         return;
@@ -90,7 +102,11 @@ fn add_errors(view: View<'_>, workspace: &Workspace, tile: &[Texel], sums: &mut 
         let target = view.texels.texel(texel.x, texel.y, texel.mip);
         let sums = &mut sums[usize::from(texel.mip) * channels..];
         for (channel, (&out, &target)) in row.iter().zip(target).enumerate() {
-            let real = (out / last.unit(channel)).clamp(view.network.low[channel], 1.0);
+            let mut real = (out / last.unit(channel)).clamp(view.network.low[channel], 1.0);
+            if let Some(formats) = stored {
+                let most = formats[channel].range().1 as f32;
+                real = (real * most).round() / most;
+            }
             sums[channel] += f64::from(real - target).powi(2);
         }
     }

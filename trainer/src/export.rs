@@ -173,12 +173,13 @@ fn layer(
 pub(crate) fn layers(
     network: &Network,
     ranges: &[Range],
-    widths: Widths,
+    config: &TrainConfig,
 ) -> Result<Vec<Layer>, TrainError> {
     let mut input_zero = 0;
     let mut out = Vec::with_capacity(network.layers.len());
     for index in 0..network.layers.len() {
         let range = ranges.get(index);
+        let widths = Widths::of(config, index);
         out.push(layer(network, index, range, input_zero, widths)?);
         input_zero = ranges.get(index).map_or(0, |r| i32::from(r.zero_point));
     }

@@ -27,7 +27,7 @@ impl Range {
     };
 }
 
-/// Bits of the integers of a decode.
+/// Bits of the integers of a layer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Widths {
     pub(crate) input: u8,
@@ -36,10 +36,10 @@ pub(crate) struct Widths {
 }
 
 impl Widths {
-    pub(crate) fn of(config: &TrainConfig) -> Widths {
+    pub(crate) fn of(config: &TrainConfig, layer: usize) -> Widths {
         Widths {
             input: config.input_bits,
-            weight: config.weight_bits,
+            weight: config.weight_bits_of(layer),
             activation: config.activation_bits,
         }
     }
@@ -100,10 +100,10 @@ pub(crate) fn quantise(
     topology: &Topology,
     parameters: &[f32],
     ranges: &[Range],
-    widths: Widths,
+    config: &TrainConfig,
     outputs: &[OutputFormat],
 ) -> Quantised {
-    let mut input_scale = vec![1.0 / (1_u32 << (widths.input - 1)) as f32];
+    let mut input_scale = vec![1.0 / (1_u32 << (config.input_bits - 1)) as f32];
     input_scale.extend(ranges.iter().map(|r| r.scale));
     let mut inverse = Vec::new();
     let mut layers = Vec::new();
@@ -111,7 +111,7 @@ pub(crate) fn quantise(
         let context = Context {
             topology,
             ranges,
-            widths,
+            widths: Widths::of(config, index),
             outputs,
             index,
             shape: *shape,

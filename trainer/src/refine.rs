@@ -9,7 +9,7 @@ use crate::latents::Rounding;
 use crate::model::{Ground, Model};
 use crate::network::Network;
 use crate::plan::{Shown, Train};
-use crate::quantise::{Quantised, Range, Widths, quantise};
+use crate::quantise::{Quantised, Range, quantise};
 use crate::random::{Purpose, Stream};
 use crate::sampler::{Numbers, Window};
 use crate::stage::{Rates, Stage};
@@ -35,7 +35,7 @@ impl Model {
             &ground.topology,
             &self.parameters,
             &self.ranges,
-            Widths::of(ground.config),
+            ground.config,
             ground.outputs(),
         )
     }
@@ -146,6 +146,7 @@ impl Model {
         let windows = Window::whole(&ground.positions);
         evaluate(
             &ground.topology,
+            Some(ground.outputs()),
             self.view(ground, &network, numbers, &windows),
         )
     }

@@ -8,7 +8,6 @@ use crate::evaluate::decibels;
 use crate::export;
 use crate::model::{Ground, Model};
 use crate::plan::Train;
-use crate::quantise::Widths;
 use crate::record;
 use crate::report::{Progress, StageReport, TrainReport, Trained, Watch};
 use crate::sampler::Numbers;
@@ -417,8 +416,7 @@ fn asset_of(
     record: Vec<(String, String)>,
 ) -> Result<Asset, TrainError> {
     let quantised = model.quantised(ground);
-    let widths = Widths::of(ground.config);
-    let layers = export::layers(&quantised.network, &model.ranges, widths)?;
+    let layers = export::layers(&quantised.network, &model.ranges, ground.config)?;
     let codes = [model.latents[0].codes(), model.latents[1].codes()];
     export::asset(ground.config, ground.source, layers, codes, record)
 }

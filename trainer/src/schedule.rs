@@ -49,13 +49,36 @@ const STEPS_PER_PASS: u64 = 64;
 /// The batch below which more steps no longer pay for their noise.
 const SMALL_BATCH: u64 = 3072;
 
-/// Texels of a step: the configured batch, fewer for a small set, at most the set's texels in whole
-/// tiles.
+/// Steps from which on a run gains more from quiet gradients than from further steps.
+const ENOUGH_STEPS: u64 = 20_000;
+
+/// Texels that a step's are a multiple of: every chunk has whole tiles.
+const TILES: u64 = (CHUNKS * TILE) as u64;
+
+/// Texels of a step: the configured batch, fewer for a small set or an effort that would take too
+/// few steps with it, at most the set's texels in whole tiles.
 pub(crate) fn batch(config: &TrainConfig, texels: u64) -> usize {
-    let tiles = (CHUNKS * TILE) as u64;
     let quick = (texels / STEPS_PER_PASS).max(SMALL_BATCH);
-    let texels_of_step = quick.min(u64::from(config.batch)).min(texels);
-    texels_of_step.next_multiple_of(tiles) as usize
+    let most = quick.min(u64::from(config.batch)).min(texels);
+    let most = most.next_multiple_of(TILES) as usize;
+    if follows_effort(config) {
+        let passes = interpolate(&PASSES, f64::from(config.effort));
+        most.min(batch_of_run((passes * texels as f64) as u64))
+    } else {
+        most
+    }
+}
+
+/// The most texels of a step in a run over `texels`, each counted as often as it is drawn.
+pub(crate) fn batch_of_run(texels: u64) -> usize {
+    let steady = texels / ENOUGH_STEPS / TILES * TILES;
+    steady.max(SMALL_BATCH) as usize
+}
+
+/// Whether the plan is that of an effort, with whatever steps.
+pub(crate) fn follows_effort(config: &TrainConfig) -> bool {
+    let plan = config.plan.as_ref();
+    plan.is_none_or(|plan| plan.name == USUAL)
 }
 
 /// The logarithm of the second number, linear in the first.
@@ -70,8 +93,8 @@ fn interpolate(points: &[(f64, f64)], at: f64) -> f64 {
 }
 
 impl TrainConfig {
-    /// The configuration with an effort of 0..=100: it decides the steps (together with the set's
-    /// texels, never with a clock), the batch and the encoder's width.
+    /// The configuration with an effort of 0..=100: it decides the steps and the batch (together
+    /// with the set's texels, never with a clock), and the encoder's width.
     ///
     /// Efforts up to 75 train latents and synthesizer alone; beyond, the encoder comes first. The
     /// names are in [`EFFORTS`].
@@ -80,11 +103,6 @@ impl TrainConfig {
         self.effort = effort.min(100);
         self.plan = None;
         self.encoder_width = if self.effort > 90 { 64 } else { 32 };
-        self.batch = match self.effort {
-            0..=20 => 3072,
-            21..=40 => 6144,
-            _ => 12_288,
-        };
         self
     }
 }

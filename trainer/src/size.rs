@@ -4,7 +4,7 @@ use crate::config::TrainConfig;
 use crate::device::TrainingDevice;
 use crate::error::TrainError;
 use crate::export;
-use crate::quantise::{Range, Widths, quantise};
+use crate::quantise::{Range, quantise};
 use crate::record;
 use crate::source::Source;
 use crate::topology::Topology;
@@ -42,10 +42,9 @@ pub fn asset_bytes(
             }
         })
         .collect();
-    let widths = Widths::of(config);
     let parameters = vec![0.0; topology.parameters];
-    let quantised = quantise(&topology, &parameters, &ranges, widths, &source.outputs);
-    let layers = export::layers(&quantised.network, &ranges, widths)?;
+    let quantised = quantise(&topology, &parameters, &ranges, config, &source.outputs);
+    let layers = export::layers(&quantised.network, &ranges, config)?;
     let mut stages = config.stages(&source.sizes())?;
     for stage in &mut stages {
         stage.steps = stage.steps.max(MOST_STEPS);

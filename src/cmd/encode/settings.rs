@@ -105,8 +105,13 @@ impl Encode {
         if let Some(bits) = self.activation_bits {
             config.activation_bits = bits;
         }
-        if let Some(bits) = self.weight_bits {
-            config.weight_bits = bits;
+        match self.weight_bits.as_deref() {
+            None => {}
+            Some([bits]) => {
+                config.weight_bits = *bits;
+                config.weight_bits_per_layer = None;
+            }
+            Some(bits) => config.weight_bits_per_layer = Some(bits.to_vec()),
         }
         Ok(())
     }

@@ -141,6 +141,14 @@ fn the_trained_integers_are_those_of_the_asset() {
 }
 
 #[test]
+fn layers_of_different_weights_are_trained_as_they_are_decoded() {
+    assert_the_export_is_what_was_trained(&TrainConfig {
+        weight_bits_per_layer: Some(vec![8, 4, 3, 5, 2, 7, 6]),
+        ..small()
+    });
+}
+
+#[test]
 fn every_kind_of_input_is_trained_as_it_is_decoded() {
     for config in embeddings() {
         for precision in [Precision::Int8, Precision::Fp16] {

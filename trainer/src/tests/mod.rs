@@ -75,6 +75,8 @@ pub(crate) fn small() -> TrainConfig {
         hidden: vec![20, 16],
         residual_blocks: 2,
         batch: 768,
+        // Runs of a few hundred steps need a high one.
+        synthesizer_rate: 0.02,
         encoder_width: 8,
         crop: 64,
         crops: 2,

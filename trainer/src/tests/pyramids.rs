@@ -65,6 +65,7 @@ fn errors(ground: &Ground<'_>, model: &mut Model) -> Vec<f64> {
     let windows = Window::whole(&ground.positions);
     let errors = evaluate(
         &ground.topology,
+        None,
         View {
             network: &network,
             embedding: ground.embedding(Numbers::Real),

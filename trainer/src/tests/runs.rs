@@ -108,7 +108,7 @@ fn every_preset_is_valid_and_makes_an_asset_of_its_sizes() {
 #[test]
 fn configurations_out_of_range_are_refused_by_field() {
     type Change = fn(&mut TrainConfig);
-    let cases: [(&str, Change); 13] = [
+    let cases: [(&str, Change); 15] = [
         ("grids[1].bits", |c| c.grids[1].bits = 9),
         ("hidden", |c| c.hidden.clear()),
         ("layers_per_block", |c| c.layers_per_block = 4),
@@ -132,6 +132,12 @@ fn configurations_out_of_range_are_refused_by_field() {
         }),
         ("precision_per_layer: found 2 layers; allowed: 7", |c| {
             c.precision_per_layer = Some(vec![Precision::Int8; 2]);
+        }),
+        ("weight_bits_per_layer: found 3 layers; allowed: 7", |c| {
+            c.weight_bits_per_layer = Some(vec![8; 3]);
+        }),
+        ("weight_bits_per_layer[1]: found 9; allowed: 2..=8", |c| {
+            c.weight_bits_per_layer = Some(vec![8, 9, 8, 8, 8, 8, 8]);
         }),
     ];
     for (field, change) in cases {
