@@ -83,7 +83,8 @@ pub struct TrainConfig {
     pub encoder_rate: f64,
     /// Learning rate of the latents, whose reals are −½..=½.
     pub latent_rate: f64,
-    /// Learning rate of the synthesizer.
+    /// Learning rate of the synthesizer. With two residual blocks or more, a stage of n > 2,000 steps
+    /// whose plan has no rate of its own takes √(2,000 ∕ n) of it.
     pub synthesizer_rate: f64,
     /// All rates in the deployed stage of the plan that follows from an effort, as a factor.
     pub integer_rate: f64,
@@ -159,6 +160,18 @@ impl TrainConfig {
         listed
             .and_then(|list| list.get(layer).copied())
             .unwrap_or(self.weight_bits)
+    }
+
+    /// The fewest bits of any layer's weights.
+    pub(crate) fn least_weight_bits(&self) -> u8 {
+        let layers = 0..self.layer_count();
+        let bits = layers.map(|layer| self.weight_bits_of(layer));
+        bits.min().unwrap_or(self.weight_bits)
+    }
+
+    /// Whether the synthesizer is one of those that run away at a high learning rate.
+    pub(crate) const fn is_deep(&self) -> bool {
+        self.residual_blocks >= 2
     }
 
     /// The shape of grid `grid`; the configuration is valid.

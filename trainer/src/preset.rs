@@ -80,12 +80,7 @@ impl Preset {
             uniform_mips: 0.1,
             encoder_rate: 1e-3,
             latent_rate: 0.01,
-            // A deeper network moves further at the same rate: with two blocks or more, 0.02 costs
-            // 0.3 dB or runs away (DESIGN).
-            synthesizer_rate: match self.residual_blocks {
-                2.. => 0.005,
-                0 | 1 => 0.02,
-            },
+            synthesizer_rate: 0.02,
             integer_rate: 0.6,
             rate_factor: 1.0,
             weights: BTreeMap::new(),

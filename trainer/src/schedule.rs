@@ -10,6 +10,10 @@ const PASSES: [(f64, f64); 4] = [(0.0, 8.0), (10.0, 30.0), (50.0, 240.0), (100.0
 /// The share of those passes that the integer stage has.
 const INTEGER_SHARE: f64 = 0.25;
 
+/// The same where weights have fewer bits than [`FEW_BITS`]: they have more to learn there.
+const FEW_BITS_SHARE: f64 = 0.5;
+const FEW_BITS: u8 = 7;
+
 /// The least steps of the two stages together, for each pass: what a set smaller than a batch
 /// gets.
 const LEAST: f64 = 8.0;
@@ -36,7 +40,12 @@ pub(crate) fn plan(config: &TrainConfig, texels: u64, batch: usize) -> Plan {
     let steps = (passes * texels as f64 / batch as f64)
         .max(LEAST * passes)
         .round();
-    let deployed = (INTEGER_SHARE * steps).round();
+    let share = if config.least_weight_bits() < FEW_BITS {
+        FEW_BITS_SHARE
+    } else {
+        INTEGER_SHARE
+    };
+    let deployed = (share * steps).round();
     let (from, most) = ENCODER;
     let encoder = (most * (f64::from(config.effort) - from) / (100.0 - from)).max(0.0);
     config.usual_plan([encoder as u64, (steps - deployed) as u64, deployed as u64])
@@ -73,6 +82,14 @@ pub(crate) fn batch(config: &TrainConfig, texels: u64) -> usize {
 pub(crate) fn batch_of_run(texels: u64) -> usize {
     let steady = texels / ENOUGH_STEPS / TILES * TILES;
     steady.max(SMALL_BATCH) as usize
+}
+
+/// The steps of a stage up to which a deep synthesizer takes its whole learning rate.
+const SHORT_STAGE: f64 = 2000.0;
+
+/// The share of its learning rate that a deep synthesizer takes in a stage of so many steps.
+pub(crate) fn ease(steps: u64) -> f64 {
+    (SHORT_STAGE / steps as f64).sqrt().min(1.0)
 }
 
 /// Whether the plan is that of an effort, with whatever steps.

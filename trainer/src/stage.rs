@@ -32,6 +32,9 @@ pub struct Stage {
     pub numbers: Arithmetic,
     /// The learning rates at a factor of 1.
     pub rates: Rates,
+    /// Whether that of the synthesizer falls with the stage's length, see
+    /// [`TrainConfig::synthesizer_rate`].
+    pub eases: bool,
     /// All of them times this.
     pub rate_factor: f64,
     /// How they go on.
@@ -71,7 +74,16 @@ impl Stage {
         Rates {
             encoder: factor * self.rates.encoder,
             latents: factor * self.rates.latents,
-            synthesizer: factor * self.rates.synthesizer,
+            synthesizer: factor * self.ease() * self.rates.synthesizer,
+        }
+    }
+
+    /// What the synthesizer's rate is multiplied with because of the stage's length.
+    fn ease(&self) -> f64 {
+        if self.eases {
+            schedule::ease(self.steps)
+        } else {
+            1.0
         }
     }
 
@@ -150,6 +162,7 @@ fn one(config: &TrainConfig, index: u32, stage: &StagePlan, crop: u32, batch: us
             latents: stage.rates.latents.unwrap_or(config.latent_rate),
             synthesizer: stage.rates.synthesizer.unwrap_or(config.synthesizer_rate),
         },
+        eases: stage.rates.synthesizer.is_none() && config.is_deep(),
         rate_factor: stage.rate_factor * config.rate_factor,
         fall: stage.fall,
         warm_up: stage.warm_up,
