@@ -83,8 +83,9 @@ pub struct TrainConfig {
     pub encoder_rate: f64,
     /// Learning rate of the latents, whose reals are −½..=½.
     pub latent_rate: f64,
-    /// Learning rate of the synthesizer. With two residual blocks or more, a stage of n > 2,000 steps
-    /// whose plan has no rate of its own takes √(2,000 ∕ n) of it.
+    /// Learning rate of the synthesizer. Where the plan has no rate of its own and there are two
+    /// residual blocks or more, a stage of n > 2,000 steps takes √(2,000 ∕ n) of it, and layers of
+    /// w > 64 take 64 ∕ w.
     pub synthesizer_rate: f64,
     /// All rates in the deployed stage of the plan that follows from an effort, as a factor.
     pub integer_rate: f64,
@@ -110,6 +111,9 @@ pub struct TrainConfig {
     /// Steps between two checkpoints.
     pub checkpoint_every: u64,
 }
+
+/// The width up to which a deep synthesizer takes its whole learning rate.
+const WIDE: u16 = 64;
 
 /// The widest hidden layer: 384 · 127 · 255 + 2^22 is just below 2^24, so that training can hold
 /// accumulators in floats exactly. Other widths of bits are checked layer by layer.
@@ -167,6 +171,16 @@ impl TrainConfig {
         let layers = 0..self.layer_count();
         let bits = layers.map(|layer| self.weight_bits_of(layer));
         bits.min().unwrap_or(self.weight_bits)
+    }
+
+    /// The synthesizer's learning rate where a plan has none, in a short stage.
+    pub(crate) fn own_synthesizer_rate(&self) -> f64 {
+        let widest = self.hidden.iter().copied().max().unwrap_or(0);
+        if self.is_deep() && widest > WIDE {
+            self.synthesizer_rate * f64::from(WIDE) / f64::from(widest)
+        } else {
+            self.synthesizer_rate
+        }
     }
 
     /// Whether the synthesizer is one of those that run away at a high learning rate.

@@ -160,7 +160,10 @@ fn one(config: &TrainConfig, index: u32, stage: &StagePlan, crop: u32, batch: us
         rates: Rates {
             encoder: stage.rates.encoder.unwrap_or(config.encoder_rate),
             latents: stage.rates.latents.unwrap_or(config.latent_rate),
-            synthesizer: stage.rates.synthesizer.unwrap_or(config.synthesizer_rate),
+            synthesizer: stage
+                .rates
+                .synthesizer
+                .unwrap_or(config.own_synthesizer_rate()),
         },
         eases: stage.rates.synthesizer.is_none() && config.is_deep(),
         rate_factor: stage.rate_factor * config.rate_factor,
