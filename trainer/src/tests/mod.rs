@@ -86,25 +86,27 @@ pub(crate) fn small() -> TrainConfig {
 }
 
 fn run(source: &Source, config: &TrainConfig) -> Result<Trained, TrainError> {
-    train(
-        source,
-        config,
-        &TrainingDevice::flex(),
-        None,
-        false,
-        &AtomicBool::new(false),
-        &mut |_| {},
-    )
+    run_with(source, config, None, false)
 }
 
 /// A run with its checkpoints at `path`, from the one that is there.
 fn resumed(source: &Source, config: &TrainConfig, path: &Path) -> Result<Trained, TrainError> {
+    run_with(source, config, Some(path), true)
+}
+
+/// A run on the processor with its checkpoints at `path`.
+fn run_with(
+    source: &Source,
+    config: &TrainConfig,
+    path: Option<&Path>,
+    resume: bool,
+) -> Result<Trained, TrainError> {
     train(
         source,
         config,
         &TrainingDevice::flex(),
-        Some(path),
-        true,
+        path,
+        resume,
         &AtomicBool::new(false),
         &mut |_| {},
     )

@@ -1,6 +1,6 @@
 //! Safety: a run that is interrupted, that diverges, or whose files are not its own.
 
-use super::{resumed, run, small, source, stopped_at, usual};
+use super::{resumed, run, run_with, small, source, stopped_at, usual};
 use crate::checkpoint;
 use crate::model::{Ground, Model};
 use crate::{Plan, TrainConfig, TrainError, TrainingDevice, train};
@@ -39,30 +39,11 @@ fn a_foreign_a_damaged_and_a_truncated_checkpoint_are_refused() {
     let config = small();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
-    let stop = AtomicBool::new(true);
-    train(
-        &source,
-        &config,
-        &TrainingDevice::flex(),
-        Some(&path),
-        false,
-        &stop,
-        &mut |_| {},
-    )
-    .unwrap_err();
+    stopped_at(&source, &config, &path, 1, false);
     let good = std::fs::read(&path).unwrap();
-    let stop = AtomicBool::new(false);
     let resumed = |config: &TrainConfig, bytes: &[u8]| {
         std::fs::write(&path, bytes).unwrap();
-        train(
-            &source,
-            config,
-            &TrainingDevice::flex(),
-            Some(&path),
-            true,
-            &stop,
-            &mut |_| {},
-        )
+        run_with(&source, config, Some(&path), true)
     };
     let other = resumed(
         &TrainConfig {
@@ -242,17 +223,7 @@ fn a_run_that_diverges_stops_and_names_the_last_checkpoint_from_before() {
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
-    let stop = AtomicBool::new(false);
-    let error = train(
-        &source,
-        &config,
-        &TrainingDevice::flex(),
-        Some(&path),
-        false,
-        &stop,
-        &mut |_| {},
-    )
-    .unwrap_err();
+    let error = run_with(&source, &config, Some(&path), false).unwrap_err();
     let TrainError::Diverged { good, .. } = &error else {
         panic!("{error}");
     };
@@ -267,16 +238,7 @@ fn a_run_that_diverges_stops_and_names_the_last_checkpoint_from_before() {
         rate_factor: 1e-3,
         ..config
     };
-    train(
-        &source,
-        &gentle,
-        &TrainingDevice::flex(),
-        Some(&path),
-        true,
-        &stop,
-        &mut |_| {},
-    )
-    .unwrap();
+    run_with(&source, &gentle, Some(&path), true).unwrap();
 }
 
 #[test]
@@ -290,17 +252,7 @@ fn a_checkpoint_that_cannot_be_written_stops_the_run_and_leaves_nothing() {
         checkpoint_every: 10,
         ..small()
     };
-    let stop = AtomicBool::new(false);
-    let error = train(
-        &source,
-        &config,
-        &TrainingDevice::flex(),
-        Some(&path),
-        false,
-        &stop,
-        &mut |_| {},
-    )
-    .unwrap_err();
+    let error = run_with(&source, &config, Some(&path), false).unwrap_err();
     assert!(
         matches!(&error, TrainError::Io { path: p, .. } if *p == path),
         "{error}"
