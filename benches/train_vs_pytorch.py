@@ -8,8 +8,8 @@ PyTorch program draws its start, its texels and its noise from the same counters
 both walk the same path until rounding parts them: the mean loss of the first twenty steps has to agree,
 or the script ends with 1. Then, for every time given with --seconds, each gets as many steps as it makes in
 that time, with the whole fall of the learning rate over them, and the PSNR of all mips and channels is
-taken with rounded latents and the real synthesizer. Steps per second and that PSNR are the result; the
-ratio is ours over PyTorch's.
+taken with rounded latents, the real synthesizer and outputs rounded to 8 bits. Steps per second and that
+PSNR are the result; the ratio is ours over PyTorch's.
 
 PyTorch runs eagerly in f32 with fused Adam. The environment goes to `versus/` under the target folder.
 
@@ -315,9 +315,9 @@ class Pytorch:
             self.biases[-1].grad[channel] = 0
         factor = rate_factor(step, steps)
         groups = self.adam.param_groups
-        groups[0]["lr"] = factor * s.config["synthesizer_rate"]
+        groups[0]["lr"] = factor * RATES["synthesizer"]
         for group, (_, bits, _) in zip(groups[1:], s.grids):
-            group["lr"] = factor * s.config["latent_rate"] * (1 << bits)
+            group["lr"] = factor * RATES["latents"] * (1 << bits)
         self.adam.step()
         with torch.no_grad():
             for latents, (_, bits, _) in zip(self.latents, s.grids):
@@ -325,7 +325,7 @@ class Pytorch:
         return loss
 
     def psnr(self):
-        """Of all mips and channels, with rounded latents."""
+        """Of all mips and channels, with rounded latents, as stored in 8 bits."""
         import torch
 
         s, total = self.setting, 0.0
@@ -335,7 +335,8 @@ class Pytorch:
                 rows = max(1, 32768 // width)
                 for top in range(0, height, rows):
                     at = torch.arange(top * width, min(top + rows, height) * width)
-                    found = self.network(self.inputs(seen, at % width, at // width, torch.full_like(at, mip))).clamp(0, 1)
+                    found = self.network(self.inputs(seen, at % width, at // width, torch.full_like(at, mip)))
+                    found = torch.round(found.clamp(0, 1) * 255) / 255
                     total += float(((found - s.texels[start + at]).double() ** 2).sum())
         return -10 * math.log10(total / s.texels.numel())
 
@@ -355,6 +356,9 @@ def rate_factor(step, steps):
 # Steps whose losses have to agree, and how well: f32 sums in another order, a few hundred terms long, part
 # by about 1e-5; a difference of kind (a texel, a weight, a rate) parts them by far more.
 COMPARED, AGREEMENT = 20, 1e-3
+
+# Learning rates of the stage.
+RATES = {"latents": 0.01, "synthesizer": 0.005}
 SMOOTHING = 0.02
 
 
@@ -371,6 +375,7 @@ def encode(program, folder, arguments, config_lines, steps, source):
     plan.write_text(
         f'name = "reals"\n[[stage]]\ntrain = "latents"\nsteps = {steps}\nbatch = {arguments.batch}\n'
         'warm_up = 100\nlatents = "noise"\nnumbers = "real"\n'
+        f'rates = {{ latents = {RATES["latents"]}, synthesizer = {RATES["synthesizer"]} }}\n'
     )
     config.write_text("\n".join([*config_lines, f"checkpoint_every = {1 << 40}", ""]))
     log, out = folder / "train.jsonl", folder / "out.ntx"
@@ -403,7 +408,7 @@ def main():
 
         theirs, smooth = Pytorch(setting), None
         for step in range(COMPARED):
-            loss = float(theirs.step(step, 10 * COMPARED))
+            loss = theirs.step(step, 10 * COMPARED).item()
             smooth = loss if smooth is None else smooth + SMOOTHING * (loss - smooth)
         ours = next(line["loss"] for line in log if line["step"] == COMPARED)
         apart = abs(ours / smooth - 1)
