@@ -27,6 +27,10 @@ pub struct Neural {
     pub plan: Option<String>,
     /// The arithmetic of every layer, by name; the preset's own where left out.
     pub precision: Option<String>,
+    /// What computes the training steps in reals, by name, where it is not the processor: bits and
+    /// identities depend on it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub backend: Option<String>,
     /// Fields of the training configuration that replace the preset's.
     pub config: BTreeMap<String, serde_json::Value>,
     /// The seed of every random choice.

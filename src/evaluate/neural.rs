@@ -54,13 +54,23 @@ mod with_trainer {
     use super::{AtomicBool, EvaluateError, Neural, Path, TextureSet, Trained};
     use crate::decoded::Decoded;
     use crate::quality;
-    use crate::trainer::{self, EFFORTS, Plan, Precision, Preset, TrainConfig, TrainingDevice};
+    use crate::trainer::{
+        self, Backend, EFFORTS, Plan, Precision, Preset, TrainConfig, TrainError, TrainingDevice,
+    };
     use crate::training_source::training_source;
     use std::time::Instant;
 
     /// Finds out before the work whether the configuration is one.
     pub(crate) fn check(codec: &Neural) -> Result<(), EvaluateError> {
-        config(codec).map(|_| ())
+        config(codec)?;
+        device(codec)?;
+        Ok(())
+    }
+
+    fn device(codec: &Neural) -> Result<TrainingDevice, TrainError> {
+        let name = codec.backend.as_deref();
+        let backend = name.map_or(Ok(Backend::Flex), Backend::by_name)?;
+        backend.open()
     }
 
     /// Trains an asset and decodes it. A checkpoint at `checkpoint` is gone on from; it is removed
@@ -78,7 +88,7 @@ mod with_trainer {
         let trained = trainer::train(
             &source,
             &config,
-            &TrainingDevice::flex(),
+            &device(codec)?,
             Some(checkpoint),
             true,
             stop,

@@ -9,9 +9,10 @@
 //! name = "CNTC"
 //! codec = "neural"
 //! presets = ["cntc-16", "cntc-32", "cntc-64"]
-//! effort = "medium"                         # optional, as are the next three
+//! effort = "medium"                         # optional, as are the next four
 //! plan = "direct"                           # a training plan, in the place of the effort's
 //! precision = "int8"
+//! backend = "wgpu"                          # as in `encode --backend`
 //! config = { uniform_mips = 0.05 }          # fields of the training configuration
 //!
 //! [[curve]]
@@ -111,6 +112,7 @@ enum RawCurve {
         effort: Option<Effort>,
         plan: Option<String>,
         precision: Option<String>,
+        backend: Option<String>,
         #[serde(default)]
         config: BTreeMap<String, serde_json::Value>,
     },
@@ -244,6 +246,7 @@ fn planned(curve: RawCurve, seed: u64) -> Result<PlannedCurve, Refusal> {
             effort,
             plan,
             precision,
+            backend,
             config,
         } => {
             for preset in &presets {
@@ -261,6 +264,7 @@ fn planned(curve: RawCurve, seed: u64) -> Result<PlannedCurve, Refusal> {
                     effort: effort.clone(),
                     plan: plan.clone(),
                     precision: precision.clone(),
+                    backend: backend.clone(),
                     config: config.clone(),
                     seed,
                 })

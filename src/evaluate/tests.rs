@@ -155,6 +155,33 @@ fn an_identity_depends_on_texels_maps_and_configuration_and_on_nothing_else() {
     assert_ne!(identity::identity("0", &together), id);
 }
 
+#[cfg(feature = "train")]
+#[test]
+fn a_backend_that_is_not_there_is_refused_before_the_work_and_makes_another_point() {
+    let point = |backend: &str| {
+        let plan = parse(&format!(
+            "name='p'\nsets=['built-in 16']\n[[curve]]\nname='n'\ncodec='neural'\npresets=['hw-16']\n{backend}"
+        ));
+        let folder = tempfile::tempdir().unwrap();
+        let evaluation = Evaluation::new(plan.unwrap(), folder.path()).unwrap();
+        let point = evaluation.chosen(&[], None)[0].clone();
+        let problem = evaluation.check(&point).err().map(|e| e.to_string());
+        (point.id, problem)
+    };
+    let (id, problem) = point("");
+    assert_eq!(problem, None);
+    // This version of the trainer has it in no build.
+    let (other, problem) = point("backend='cuda'");
+    assert_ne!(id, other);
+    let problem = problem.unwrap();
+    assert!(problem.contains("cuda"), "{problem}");
+    let problem = point("backend='abacus'").1.unwrap();
+    assert!(
+        problem.contains("abacus") && problem.contains("flex"),
+        "{problem}"
+    );
+}
+
 #[test]
 fn finished_points_are_not_made_again_and_what_was_stopped_goes_on() {
     let folder = tempfile::tempdir().unwrap();
