@@ -1,6 +1,7 @@
 //! Adam (Kingma and Ba 2015) on flat slices.
 
 use crate::kernel::{Vectorised, vectorised};
+use std::ops::Range;
 
 /// Decay of the first moment.
 pub(crate) const BETA1: f32 = 0.9;
@@ -57,11 +58,23 @@ impl Moments {
 
     /// One update of `parameters` along `gradient`.
     pub(crate) fn update(&mut self, rate: Rate, parameters: &mut [f32], gradient: &[f32]) {
+        self.update_part(0..parameters.len(), rate, parameters, gradient);
+    }
+
+    /// The same of a part of them.
+    pub(crate) fn update_part(
+        &mut self,
+        part: Range<usize>,
+        rate: Rate,
+        parameters: &mut [f32],
+        gradient: &[f32],
+    ) {
         vectorised(Update {
             rate,
-            parameters,
-            gradient,
-            moments: self,
+            parameters: &mut parameters[part.clone()],
+            gradient: &gradient[part.clone()],
+            first: &mut self.first[part.clone()],
+            second: &mut self.second[part],
         });
     }
 }
@@ -70,13 +83,14 @@ struct Update<'a> {
     rate: Rate,
     parameters: &'a mut [f32],
     gradient: &'a [f32],
-    moments: &'a mut Moments,
+    first: &'a mut [f32],
+    second: &'a mut [f32],
 }
 
 impl Vectorised for Update<'_> {
     #[inline(always)]
     fn run<const FUSED: bool>(self) {
-        let moments = self.moments.first.iter_mut().zip(&mut self.moments.second);
+        let moments = self.first.iter_mut().zip(self.second);
         for ((p, &g), (m, v)) in self.parameters.iter_mut().zip(self.gradient).zip(moments) {
             *p -= self.rate.advance(g, m, v);
         }

@@ -97,6 +97,26 @@ impl From<Wave> for WaveForm {
     }
 }
 
+/// Where latents start that no encoder makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FirstLatents {
+    /// At the principal components of the texels under their cells.
+    Components,
+    /// At random around zero.
+    Random,
+}
+
+/// What moves the synthesizer's parameters; latents and encoders always take Adam.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Optimiser {
+    /// Adam (Kingma and Ba 2015).
+    Adam,
+    /// Muon (Jordan et al. 2024) for the weights of the hidden layers, Adam for the rest.
+    Muon,
+}
+
 /// What a grid gives the synthesizer; see [`ntmu_isa::shape::Sampling`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -1,6 +1,9 @@
 //! Everything that decides what a training run makes.
 
-use crate::choices::{ActivationKind, Address, GridSampling, Precision, Pyramid, Snap, WaveForm};
+use crate::choices::{
+    ActivationKind, Address, FirstLatents, GridSampling, Optimiser, Precision, Pyramid, Snap,
+    WaveForm,
+};
 use crate::error::TrainError;
 use crate::plan::Plan;
 use ntmu_isa::embed::WAVES_PER_OCTAVE;
@@ -79,9 +82,14 @@ pub struct TrainConfig {
     pub batch: u32,
     /// The share of texels whose mip is drawn uniformly, 0..=1.
     pub uniform_mips: f64,
+    /// Where latents start that no encoder makes, where the plan does not say.
+    pub first_latents: FirstLatents,
+    /// What moves the synthesizer's parameters, where the plan does not say.
+    pub optimiser: Optimiser,
     /// Learning rate of the encoder and its constructors.
     pub encoder_rate: f64,
-    /// Learning rate of the latents, whose reals are −½..=½.
+    /// Learning rate of the latents, whose reals are −½..=½. Where the plan has no rate of its own, a
+    /// stage of n < 4,000 steps takes √(4,000 ∕ n) times as much.
     pub latent_rate: f64,
     /// Learning rate of the synthesizer. Where the plan has no rate of its own and there are two
     /// residual blocks or more, a stage of n > 2,000 steps takes √(2,000 ∕ n) of it, and layers of
@@ -181,6 +189,12 @@ impl TrainConfig {
         } else {
             self.synthesizer_rate
         }
+    }
+
+    /// Where latents start that no encoder makes.
+    pub(crate) fn first_latents(&self) -> FirstLatents {
+        let of_plan = self.plan.as_ref().and_then(|plan| plan.first_latents);
+        of_plan.unwrap_or(self.first_latents)
     }
 
     /// Whether the synthesizer is one of those that run away at a high learning rate.

@@ -2,6 +2,7 @@
 
 use crate::adam::Rate;
 use crate::constructor::{Constructors, Piece};
+use crate::descent::Descent;
 use crate::encoder::{Encoder, RECEPTIVE, SCALE_LOG2};
 use crate::engine::{Engine, View};
 use crate::error::TrainError;
@@ -355,11 +356,10 @@ impl Model {
         ground.hold_constants(&mut engine.parameters);
         let gradient = encoder.backward(pass, of_tensors)?;
         let of_encoder = Rate::new(rates.encoder, step + 1);
-        let of_synthesizer = Rate::new(rates.synthesizer, step + 1);
+        let of_synthesizer = Descent::new(stage.optimiser, rates.synthesizer, step + 1);
         self.encoder_moments
             .update(of_encoder, &mut self.encoder, &gradient);
-        self.moments
-            .update(of_synthesizer, &mut self.parameters, &engine.parameters);
+        self.follow(ground, of_synthesizer, &engine.parameters);
         Ok(loss)
     }
 

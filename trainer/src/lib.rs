@@ -33,6 +33,7 @@ mod config;
 mod constructor;
 mod convolution;
 mod crop;
+mod descent;
 mod device;
 mod encoder;
 mod encoder_pass;
@@ -41,6 +42,7 @@ mod epilogue;
 mod error;
 mod evaluate;
 mod export;
+mod first_latents;
 mod graph;
 mod half;
 mod integer;
@@ -70,7 +72,8 @@ mod topology;
 mod train;
 
 pub use choices::{
-    ActivationKind, Address, GridSampling, PYRAMIDS, Precision, Pyramid, Snap, WaveForm,
+    ActivationKind, Address, FirstLatents, GridSampling, Optimiser, PYRAMIDS, Precision, Pyramid,
+    Snap, WaveForm,
 };
 pub use config::{GridConfig, TrainConfig};
 pub use device::{Backend, TrainingDevice};

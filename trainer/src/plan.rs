@@ -1,5 +1,6 @@
 //! Plan: what a run trains, stage after stage, as its file says it.
 
+use crate::choices::{FirstLatents, Optimiser};
 use crate::error::TrainError;
 use serde::{Deserialize, Serialize};
 
@@ -92,6 +93,9 @@ pub struct StagePlan {
     /// The learning rates.
     #[serde(default)]
     pub rates: RatesPlan,
+    /// What moves the synthesizer's parameters; by default the configuration's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub optimiser: Option<Optimiser>,
     /// All of them times this.
     #[serde(default = "one")]
     pub rate_factor: f64,
@@ -129,6 +133,9 @@ const fn one() -> f64 {
 pub struct Plan {
     /// The name, for the asset's record.
     pub name: String,
+    /// Where latents start that no encoder makes; by default the configuration's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_latents: Option<FirstLatents>,
     /// The stages, in the order in which they run.
     pub stage: Vec<StagePlan>,
 }

@@ -50,6 +50,7 @@ pub(crate) struct Positions {
     waves_per_axis: usize,
     /// The level of the grids that serves each mip.
     served_by: Vec<u8>,
+    mips_under: Vec<u8>,
     /// The levels of each grid, level 0 first.
     pub(crate) levels: [Vec<Level>; 2],
 }
@@ -98,6 +99,9 @@ impl Positions {
                 .collect(),
             waves_per_axis: 2 * usize::from(shape.octaves),
             served_by: mips.map(|m| shape.pyramid.level_of(m)).collect(),
+            mips_under: (0..shape.level_count())
+                .map(|level| shape.pyramid.reduction_log2(level))
+                .collect(),
             levels,
         }
     }
@@ -106,6 +110,11 @@ impl Positions {
     #[inline(always)]
     pub(crate) fn level_of(&self, mip: u8) -> usize {
         usize::from(self.served_by[usize::from(mip)])
+    }
+
+    /// The mip under level `level` as mip 0 is under level 0. A chain may end before it.
+    pub(crate) fn mip_under(&self, level: usize) -> u8 {
+        self.mips_under[level]
     }
 
     /// Levels of each grid.

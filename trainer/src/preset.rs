@@ -1,6 +1,6 @@
 //! Presets: configurations with a name.
 
-use crate::choices::Precision;
+use crate::choices::{FirstLatents, Optimiser, Precision};
 use crate::config::{GridConfig, TrainConfig};
 use crate::error::TrainError;
 use ntmu_isa::preset;
@@ -78,8 +78,10 @@ impl Preset {
             crops: 4,
             batch: 12_288,
             uniform_mips: 0.1,
+            first_latents: FirstLatents::Components,
+            optimiser: Optimiser::Muon,
             encoder_rate: 1e-3,
-            latent_rate: 0.01,
+            latent_rate: 0.005,
             synthesizer_rate: 0.02,
             integer_rate: 0.6,
             rate_factor: 1.0,

@@ -20,6 +20,8 @@ pub(crate) enum Purpose {
     Crop,
     /// Which texels calibrate the activations.
     Calibration,
+    /// Where the search for the principal components starts.
+    Components,
 }
 
 /// A stream of numbers, addressed by index.

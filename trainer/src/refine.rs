@@ -3,6 +3,7 @@
 
 use crate::adam::Rate;
 use crate::calibrate::calibrate;
+use crate::descent::Descent;
 use crate::engine::{Engine, View};
 use crate::evaluate::{Errors, evaluate};
 use crate::latents::Rounding;
@@ -120,9 +121,8 @@ impl Model {
             q.to_real_gradient(&ground.topology, &mut engine.parameters);
         }
         ground.hold_constants(&mut engine.parameters);
-        let rate = Rate::new(rates.synthesizer, step + 1);
-        self.moments
-            .update(rate, &mut self.parameters, &engine.parameters);
+        let descent = Descent::new(stage.optimiser, rates.synthesizer, step + 1);
+        self.follow(ground, descent, &engine.parameters);
         if stage.train == Train::Latents {
             let embedding = ground.embedding(numbers);
             let [g0, g1] = &mut self.latents;
@@ -134,6 +134,12 @@ impl Model {
             }
         }
         loss
+    }
+
+    /// Moves the synthesizer's parameters along their gradient.
+    pub(crate) fn follow(&mut self, ground: &Ground<'_>, descent: Descent, gradient: &[f32]) {
+        let (moments, parameters) = (&mut self.moments, &mut self.parameters);
+        descent.update(&ground.topology, moments, parameters, gradient);
     }
 
     /// The error over every texel, in reals or in the asset's numbers.

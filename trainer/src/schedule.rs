@@ -92,6 +92,14 @@ pub(crate) fn ease(steps: u64) -> f64 {
     (SHORT_STAGE / steps as f64).sqrt().min(1.0)
 }
 
+/// The steps of a stage from which on latents have the time to come where they belong.
+const LONG_STAGE: f64 = 4000.0;
+
+/// How many times their learning rate latents take in a stage of so many steps.
+pub(crate) fn haste(steps: u64) -> f64 {
+    (LONG_STAGE / steps.max(1) as f64).sqrt().max(1.0)
+}
+
 /// Whether the plan is that of an effort, with whatever steps.
 pub(crate) fn follows_effort(config: &TrainConfig) -> bool {
     let plan = config.plan.as_ref();
@@ -136,6 +144,7 @@ impl TrainConfig {
             latents,
             numbers,
             rates: RatesPlan::default(),
+            optimiser: None,
             rate_factor: 1.0,
             fall: Fall::Cosine,
             warm_up: WARM_UP,
@@ -152,6 +161,7 @@ impl TrainConfig {
             Arithmetic::Deployed,
         );
         Plan {
+            first_latents: None,
             name: USUAL.to_owned(),
             stage: vec![
                 stage(Train::Encoder, encoder, Shown::Noise, Arithmetic::Real),

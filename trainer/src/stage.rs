@@ -1,5 +1,6 @@
 //! Stage: one stage of a plan with nothing left to decide.
 
+use crate::choices::Optimiser;
 use crate::config::TrainConfig;
 use crate::error::TrainError;
 use crate::plan::{Arithmetic, Fall, Mips, Plan, Shown, StagePlan, Train};
@@ -32,9 +33,13 @@ pub struct Stage {
     pub numbers: Arithmetic,
     /// The learning rates at a factor of 1.
     pub rates: Rates,
+    /// Whether that of the latents rises in a short stage, see [`TrainConfig::latent_rate`].
+    pub hastens: bool,
     /// Whether that of the synthesizer falls with the stage's length, see
     /// [`TrainConfig::synthesizer_rate`].
     pub eases: bool,
+    /// What moves the synthesizer's parameters.
+    pub optimiser: Optimiser,
     /// All of them times this.
     pub rate_factor: f64,
     /// How they go on.
@@ -73,18 +78,16 @@ impl Stage {
         let factor = self.rate_factor * schedule::factor(self.fall, self.warm_up, step, self.steps);
         Rates {
             encoder: factor * self.rates.encoder,
-            latents: factor * self.rates.latents,
-            synthesizer: factor * self.ease() * self.rates.synthesizer,
+            latents: factor * self.of_length(self.hastens, schedule::haste) * self.rates.latents,
+            synthesizer: factor
+                * self.of_length(self.eases, schedule::ease)
+                * self.rates.synthesizer,
         }
     }
 
-    /// What the synthesizer's rate is multiplied with because of the stage's length.
-    fn ease(&self) -> f64 {
-        if self.eases {
-            schedule::ease(self.steps)
-        } else {
-            1.0
-        }
+    /// What a rate is multiplied with because of the stage's length, where it is.
+    fn of_length(&self, follows: bool, rule: impl Fn(u64) -> f64) -> f64 {
+        if follows { rule(self.steps) } else { 1.0 }
     }
 
     /// The number of a step's random streams: no two stages share one.
@@ -165,7 +168,9 @@ fn one(config: &TrainConfig, index: u32, stage: &StagePlan, crop: u32, batch: us
                 .synthesizer
                 .unwrap_or(config.own_synthesizer_rate()),
         },
+        hastens: stage.rates.latents.is_none(),
         eases: stage.rates.synthesizer.is_none() && config.is_deep(),
+        optimiser: stage.optimiser.unwrap_or(config.optimiser),
         rate_factor: stage.rate_factor * config.rate_factor,
         fall: stage.fall,
         warm_up: stage.warm_up,

@@ -2,9 +2,11 @@
 
 use crate::budget::Budget;
 use crate::checkpoint::{self, Position};
+use crate::choices::FirstLatents;
 use crate::config::TrainConfig;
 use crate::device::TrainingDevice;
 use crate::error::TrainError;
+use crate::first_latents;
 use crate::model::{Ground, Model};
 use crate::plan::Train;
 use crate::report::{Progress, Trained, Watch};
@@ -74,6 +76,8 @@ pub fn watched(
         .any(|s| s.train == Train::Encoder && s.steps > 0)
     {
         model.start_encoder(&ground);
+    } else if config.first_latents() == FirstLatents::Components {
+        first_latents::set(&ground, &mut model.latents);
     }
     let mut budget = None;
     let position = match checkpoint.filter(|path| resume && path.exists()) {

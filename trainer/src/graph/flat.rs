@@ -8,8 +8,8 @@ use burn_tensor::{Device, Gradients, Tensor, TensorData};
 #[derive(Clone, Debug)]
 pub(crate) struct Flat {
     pub(crate) values: Tensor<1>,
-    first: Tensor<1>,
-    second: Tensor<1>,
+    pub(super) first: Tensor<1>,
+    pub(super) second: Tensor<1>,
 }
 
 /// A float tensor on a device.

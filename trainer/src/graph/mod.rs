@@ -25,6 +25,7 @@ mod tests;
 
 use crate::adam::Rate;
 use crate::crop::{self, Crops};
+use crate::descent::Descent;
 use crate::encoder::{Encoder, backward_from};
 use crate::error::TrainError;
 use crate::latents::Rounding;
@@ -128,7 +129,8 @@ impl Graph {
         ground: &Ground<'_>,
         crops: &Crops,
         drawn: Drawn<'_>,
-        [of_encoder, of_synthesizer]: [Rate; 2],
+        of_encoder: Rate,
+        of_synthesizer: Descent,
     ) {
         match &mut self.trained {
             Trained::Encoder(on_crops) => {
@@ -151,7 +153,7 @@ impl Graph {
         &mut self,
         ground: &Ground<'_>,
         drawn: Drawn<'_>,
-        of_synthesizer: Rate,
+        of_synthesizer: Descent,
         of_latents: Option<[Rate; 2]>,
     ) {
         let grids = match &mut self.trained {
@@ -188,7 +190,7 @@ impl OnCrops {
         ground: &Ground<'_>,
         crops: &Crops,
         drawn: Drawn<'_>,
-        of_synthesizer: Rate,
+        of_synthesizer: Descent,
         of_encoder: Rate,
     ) {
         let leaves: Vec<_> = self

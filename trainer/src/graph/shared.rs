@@ -4,8 +4,8 @@
 use super::flat::{Flat, download, upload};
 use super::places::Places;
 use super::synthesizer::Leaves;
-use crate::adam::Rate;
 use crate::batch::all_texels;
+use crate::descent::Descent;
 use crate::error::TrainError;
 use crate::latents::Rounding;
 use crate::model::{Ground, Model};
@@ -113,7 +113,7 @@ impl Shared {
         windows: &[Window],
         texels: &[Texel],
         seen: [Tensor<2>; 2],
-        rate: Rate,
+        descent: Descent,
     ) -> WayBack {
         let topology = &ground.topology;
         let embedding = ground.embedding(Numbers::Real);
@@ -155,7 +155,7 @@ impl Shared {
         if let Some(moves) = &self.moves {
             gradient = gradient * moves.clone();
         }
-        self.synthesizer.update(rate, gradient);
+        self.synthesizer.descend(topology, descent, gradient);
         let of_inputs = inputs.grad_remove(&mut gradients);
         WayBack {
             of_inputs: of_inputs.unwrap_or_else(|| inputs.inner().zeros_like()),

@@ -4,6 +4,7 @@ use super::{Drawn, Graph, Subject};
 use crate::adam::Rate;
 use crate::batch::draw_texel;
 use crate::crop::Crops;
+use crate::descent::Descent;
 use crate::latents::Rounding;
 use crate::model::Ground;
 use crate::plan::{Shown, Train};
@@ -32,7 +33,7 @@ impl Graph {
             Shown::Noise => Rounding::Noise(noise.wrapping_add(g)),
             Shown::Rounded => Rounding::Nearest,
         });
-        let of_synthesizer = Rate::new(rates.synthesizer, step + 1);
+        let of_synthesizer = Descent::new(stage.optimiser, rates.synthesizer, step + 1);
         match Subject::of(stage.train) {
             Subject::Encoder => {
                 let crops = Crops::draw(ground, stage, step);
@@ -43,8 +44,8 @@ impl Graph {
                     texels: &texels,
                     roundings,
                 };
-                let rates = [Rate::new(rates.encoder, step + 1), of_synthesizer];
-                self.crops_step(ground, &crops, drawn, rates);
+                let of_encoder = Rate::new(rates.encoder, step + 1);
+                self.crops_step(ground, &crops, drawn, of_encoder, of_synthesizer);
             }
             Subject::Latents => {
                 let texels: Vec<Texel> = (0..stage.batch as u64)

@@ -2,6 +2,7 @@
 
 use super::flat::{Flat, flat_gradient};
 use crate::choices::ActivationKind;
+use crate::descent::{COEFFICIENTS, Descent, LEAST_NORM, MOMENTUM, ROUNDS, update_size};
 use crate::topology::Topology;
 use burn_tensor::{Gradients, Tensor, activation};
 
@@ -45,6 +46,52 @@ impl Leaves {
         });
         Tensor::cat(parts.collect(), 0)
     }
+}
+
+impl Flat {
+    /// [`Descent::update`] on a device.
+    pub(crate) fn descend(&mut self, topology: &Topology, descent: Descent, gradient: Tensor<1>) {
+        let (rate, others) = match descent {
+            Descent::Adam(rate) => {
+                self.update(rate, gradient);
+                return;
+            }
+            Descent::Muon { rate, others } => (rate, others),
+        };
+        let Some((_, hidden)) = topology.layers.split_last() else {
+            return;
+        };
+        let mut by_adam = self.clone();
+        by_adam.update(others, gradient.clone());
+        for layer in hidden {
+            let (at, sides) = (layer.weights_at, [layer.rows(), layer.columns()]);
+            let part = at..layer.bias_at;
+            let gradient = gradient.clone().narrow(0, at, part.len());
+            let first = self.first.clone().narrow(0, at, part.len());
+            let mix = |first: Tensor<1>| first * MOMENTUM + gradient.clone() * (1.0 - MOMENTUM);
+            let momentum = mix(first);
+            let ahead = mix(momentum.clone()).reshape(sides);
+            let update = orthogonal(ahead).reshape([part.len()]) * (rate * update_size(layer));
+            let values = self.values.clone().narrow(0, at, part.len()) - update;
+            by_adam.values = by_adam.values.slice_assign([part.clone()], values);
+            by_adam.first = by_adam.first.slice_assign([part.clone()], momentum);
+            let second = self.second.clone().narrow(0, at, part.len());
+            by_adam.second = by_adam.second.slice_assign([part], second);
+        }
+        *self = by_adam;
+    }
+}
+
+fn orthogonal(x: Tensor<2>) -> Tensor<2> {
+    let norm = (x.clone() * x.clone()).sum().sqrt() + LEAST_NORM;
+    let mut x = x / norm.unsqueeze();
+    let [a, b, c] = COEFFICIENTS;
+    for _ in 0..ROUNDS {
+        let squares = x.clone().transpose().matmul(x.clone());
+        let polynomial = squares.clone().matmul(squares.clone()) * c + squares * b;
+        x = x.clone() * a + x.matmul(polynomial);
+    }
+    x
 }
 
 fn activate(x: Tensor<2>, kind: ActivationKind) -> Tensor<2> {

@@ -4,19 +4,21 @@ use super::{Graph, Subject};
 use crate::adam::{BETA1, EPSILON, Moments, Rate};
 use crate::config::TrainConfig;
 use crate::crop::{constructors, encoder};
+use crate::descent::{COEFFICIENTS, MOMENTUM, ROUNDS, update_size};
 use crate::encoder::BLOCKS;
 use crate::engine::Engine;
 use crate::error::TrainError;
 use crate::model::{Ground, Model};
 use crate::tests::{small, source};
 use crate::{
-    ActivationKind, Address, GridSampling, Progress, Pyramid, Rates, Shown, Source, Stage, Train,
-    TrainingDevice, Watch, train, watched,
+    ActivationKind, Address, GridSampling, Optimiser, Progress, Pyramid, Rates, Shown, Source,
+    Stage, Train, TrainingDevice, Watch, train, watched,
 };
 use burn_tensor::Device;
 use ndarray::Array2;
 use ntmu_isa::Asset;
 use ntmu_isa::asset::Map;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The unit roundoff of f32.
@@ -70,7 +72,17 @@ fn assert_gradients_agree(
     before: &Moments,
     (left, right): (&Moments, &Moments),
 ) {
-    let keep = f64::from(BETA1);
+    assert_momenta_agree(name, (bound, BETA1), before, (left, right));
+}
+
+/// The same where the momentum decays at another rate.
+fn assert_momenta_agree(
+    name: &str,
+    (bound, keep): (f64, f32),
+    before: &Moments,
+    (left, right): (&Moments, &Moments),
+) {
+    let keep = f64::from(keep);
     let gradient = |after: &Moments| -> Vec<f64> {
         let moments = after.first.iter().zip(&before.first);
         moments
@@ -99,6 +111,49 @@ fn assert_updated(name: &str, rate: Rate, before: &[f32], after: &[f32], moments
         let bound = 16.0 * U * f64::from(before.abs() + step.abs());
         let error = f64::from((after - expected).abs());
         assert!(error <= bound, "{name} {at}: {after} instead of {expected}");
+    }
+}
+
+/// Fails unless Muon took the synthesizer from `before` to both others, and Adam what Muon leaves.
+fn assert_muon_agrees(
+    ground: &Ground<'_>,
+    bound: f64,
+    rate: Rate,
+    [before, left, right]: [&Model; 3],
+) {
+    let (last, hidden) = ground.topology.layers.split_last().unwrap();
+    let moments = |model: &Model, part: Range<usize>| Moments {
+        first: model.moments.first[part.clone()].to_vec(),
+        second: model.moments.second[part].to_vec(),
+    };
+    let all = [before, left, right];
+    let by_adam = hidden
+        .iter()
+        .map(|layer| layer.bias_at..layer.bias_at + layer.columns())
+        .chain([last.weights_at..last.bias_at + last.columns()]);
+    for part in by_adam {
+        let [old, new, other] = all.map(|model| moments(model, part.clone()));
+        assert_gradients_agree("by Adam", bound, &old, (&new, &other));
+        let [old, values, _] = all.map(|model| &model.parameters[part.clone()]);
+        assert_updated("by Adam", rate, old, values, &new);
+    }
+    // The polynomials are steepest at zero, and an odd function of singular values changes a matrix
+    // by no more than its largest slope times the change (in Frobenius norms).
+    let slope = f64::from(COEFFICIENTS[0]).powi(ROUNDS as i32);
+    for layer in hidden {
+        let part = layer.weights_at..layer.bias_at;
+        let [old, new, other] = all.map(|model| moments(model, part.clone()));
+        assert_momenta_agree("momentum", (bound, MOMENTUM), &old, (&new, &other));
+        assert_eq!(new.second, old.second);
+        let [old, new, other] = all.map(|model| &model.parameters[part.clone()]);
+        let difference =
+            |a: &[f32], b: &[f32]| norm(a.iter().zip(b).map(|(a, b)| f64::from(a - b)));
+        let one = RATES.synthesizer * f64::from(update_size(layer));
+        let error = difference(new, other) / one;
+        assert!(error <= slope * bound, "{error:e} > {slope} · {bound:e}");
+        // At least one singular value, and the iteration leaves none that mattered below 0.68.
+        let moved = difference(new, old) / one;
+        assert!(moved > 0.68, "{moved}");
     }
 }
 
@@ -165,7 +220,10 @@ struct Case {
 impl Case {
     fn of(train: Train) -> Case {
         Case {
-            config: small(),
+            config: TrainConfig {
+                optimiser: Optimiser::Adam,
+                ..small()
+            },
             source: source(96, 80, 5),
             train,
             shown: Shown::Noise,
@@ -233,11 +291,15 @@ fn assert_steps_agree(device: &Device, case: &Case) {
         );
 
         let rate = |rate| Rate::new(rate, step + 1);
-        let moments = (&other.moments, &model.moments);
-        assert_gradients_agree("synthesizer", bound, &before.moments, moments);
         let of_synthesizer = rate(RATES.synthesizer);
-        let (old, new) = (&before.parameters, &other.parameters);
-        assert_updated("synthesizer", of_synthesizer, old, new, &other.moments);
+        if stage.optimiser == Optimiser::Muon {
+            assert_muon_agrees(&ground, bound, of_synthesizer, [&before, &other, &model]);
+        } else {
+            let moments = (&other.moments, &model.moments);
+            assert_gradients_agree("synthesizer", bound, &before.moments, moments);
+            let (old, new) = (&before.parameters, &other.parameters);
+            assert_updated("synthesizer", of_synthesizer, old, new, &other.moments);
+        }
         if case.train == Train::Encoder {
             let moments = (&other.encoder_moments, &model.encoder_moments);
             assert_gradients_agree("encoder", bound, &before.encoder_moments, moments);
@@ -289,7 +351,13 @@ fn cases() -> Vec<Case> {
         Case { train, ..case }
     };
     let [encoder, latents] = [Train::Encoder, Train::Latents];
+    let muon = |mut case: Case| {
+        case.config.optimiser = Optimiser::Muon;
+        case
+    };
     vec![
+        muon(plain(encoder)),
+        muon(plain(latents)),
         Case {
             gain: 8.0,
             ..plain(encoder)
