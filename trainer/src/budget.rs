@@ -108,7 +108,7 @@ impl Budget {
                 scratch.encode_whole(ground)?;
             }
             if scratch.ranges.is_empty() && stage.is_deployed() {
-                scratch.calibrate(ground);
+                scratch.deploy(ground);
             }
             between += preparing.elapsed().as_secs_f64();
             let cost = seconds_of_step(ground, scratch, stage, device, share)?;

@@ -30,6 +30,38 @@ pub(crate) fn calibrate(
     texels: &[Texel],
     bits: u8,
 ) -> Vec<Range> {
+    let outputs = hidden_outputs(topology, view, texels);
+    let ranges = outputs.iter().enumerate().map(|(index, values)| {
+        let layer = topology.layers[index];
+        let is_clamped = layer.activated && topology.activation == ActivationKind::ClampedHardGelu;
+        match layer.precision {
+            Precision::Int8 if is_clamped => range_between(CLAMPED.0, CLAMPED.1, bits),
+            Precision::Int8 => best_range(values, bits),
+            Precision::Fp16 if topology.writes_halves(index) => Range::HALVES,
+            Precision::Fp16 => best_power(values, bits),
+        }
+    });
+    ranges.collect()
+}
+
+/// How far each neuron of each hidden layer goes from zero.
+pub(crate) fn extents(topology: &Topology, view: View<'_>, texels: &[Texel]) -> Vec<Vec<f32>> {
+    let outputs = hidden_outputs(topology, view, texels);
+    let layers = outputs.iter().zip(&topology.layers);
+    let of_layer = layers.map(|(values, layer)| {
+        let mut most = vec![0.0_f32; layer.outputs];
+        for row in values.chunks_exact(layer.outputs) {
+            for (most, value) in most.iter_mut().zip(row) {
+                *most = most.max(value.abs());
+            }
+        }
+        most
+    });
+    of_layer.collect()
+}
+
+/// What each hidden layer puts out: texels × outputs.
+fn hidden_outputs(topology: &Topology, view: View<'_>, texels: &[Texel]) -> Vec<Vec<f32>> {
     let hidden = topology.layers.len() - 1;
     let mut outputs: Vec<Vec<f32>> = vec![Vec::new(); hidden];
     let mut workspace = Workspace::new(topology);
@@ -46,17 +78,7 @@ pub(crate) fn calibrate(
             }
         }
     }
-    let ranges = outputs.iter().enumerate().map(|(index, values)| {
-        let layer = topology.layers[index];
-        let is_clamped = layer.activated && topology.activation == ActivationKind::ClampedHardGelu;
-        match layer.precision {
-            Precision::Int8 if is_clamped => range_between(CLAMPED.0, CLAMPED.1, bits),
-            Precision::Int8 => best_range(values, bits),
-            Precision::Fp16 if topology.writes_halves(index) => Range::HALVES,
-            Precision::Fp16 => best_power(values, bits),
-        }
-    });
-    ranges.collect()
+    outputs
 }
 
 /// One tile forward, without targets.

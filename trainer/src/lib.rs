@@ -39,6 +39,7 @@ mod encoder;
 mod encoder_pass;
 mod engine;
 mod epilogue;
+mod equalise;
 mod error;
 mod evaluate;
 mod export;

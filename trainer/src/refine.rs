@@ -2,17 +2,18 @@
 //! decode.
 
 use crate::adam::Rate;
-use crate::calibrate::calibrate;
+use crate::calibrate::{calibrate, extents};
 use crate::descent::Descent;
 use crate::engine::{Engine, View};
+use crate::equalise::equalise;
 use crate::evaluate::{Errors, evaluate};
 use crate::latents::Rounding;
 use crate::model::{Ground, Model};
 use crate::network::Network;
 use crate::plan::{Shown, Train};
-use crate::quantise::{Quantised, Range, quantise};
+use crate::quantise::{Quantised, quantise};
 use crate::random::{Purpose, Stream};
-use crate::sampler::{Numbers, Window};
+use crate::sampler::{Numbers, Texel, Window};
 use crate::stage::{Rates, Stage};
 
 /// Texels that calibrate the activations.
@@ -45,12 +46,34 @@ impl Model {
         Network::real(&ground.topology, &self.parameters, &ground.low)
     }
 
-    /// Fixes the ranges of the hidden layers.
-    pub(crate) fn calibrate(&mut self, ground: &Ground<'_>) {
-        self.ranges = self.measured_ranges(ground);
+    /// Prepares the network in reals for the numbers of the decode: neurons come nearer one range,
+    /// and the ranges of the hidden layers are fixed.
+    pub(crate) fn deploy(&mut self, ground: &Ground<'_>) {
+        self.equalise(ground);
+        let bits = ground.config.activation_bits;
+        self.ranges = self.on_sample(ground, |view, texels| {
+            calibrate(&ground.topology, view, texels, bits)
+        });
     }
 
-    fn measured_ranges(&mut self, ground: &Ground<'_>) -> Vec<Range> {
+    pub(crate) fn equalise(&mut self, ground: &Ground<'_>) {
+        let extents = self.extents(ground);
+        equalise(&ground.topology, &extents, &mut self.parameters);
+    }
+
+    /// How far each neuron of each hidden layer goes from zero.
+    pub(crate) fn extents(&mut self, ground: &Ground<'_>) -> Vec<Vec<f32>> {
+        self.on_sample(ground, |view, texels| {
+            extents(&ground.topology, view, texels)
+        })
+    }
+
+    /// What `look` sees of the present network in reals, with texels to try it on.
+    fn on_sample<T>(
+        &mut self,
+        ground: &Ground<'_>,
+        look: impl FnOnce(View<'_>, &[Texel]) -> T,
+    ) -> T {
         self.show(|_| Rounding::Nearest);
         let stream = Stream::new(ground.config.seed, Purpose::Calibration, 0);
         let texels: Vec<_> = (0..CALIBRATION as u64)
@@ -62,8 +85,7 @@ impl Model {
         let network = self.real(ground);
         let windows = Window::whole(&ground.positions);
         let view = self.view(ground, &network, Numbers::Real, &windows);
-        let bits = ground.config.activation_bits;
-        calibrate(&ground.topology, view, &texels, bits)
+        look(view, &texels)
     }
 
     fn view<'v>(

@@ -160,7 +160,7 @@ impl<'a> Run<'a> {
     fn deploy(&mut self) {
         let errors = self.model.evaluate(&self.ground, Numbers::Real);
         self.position.psnr_float = decibels(errors.overall());
-        self.model.calibrate(&self.ground);
+        self.model.deploy(&self.ground);
     }
 
     fn steps(
@@ -347,11 +347,13 @@ impl<'a> Run<'a> {
         if stage.train == Train::Encoder {
             self.model.encode_whole(&self.ground)?;
         }
-        let ranges = self.model.ranges.clone();
-        if !stage.is_deployed() {
-            self.model.calibrate(&self.ground);
+        if stage.is_deployed() {
+            return Ok(look(&mut self.model, &self.ground));
         }
+        let (parameters, ranges) = (self.model.parameters.clone(), self.model.ranges.clone());
+        self.model.deploy(&self.ground);
         let seen = look(&mut self.model, &self.ground);
+        self.model.parameters = parameters;
         self.model.ranges = ranges;
         Ok(seen)
     }
