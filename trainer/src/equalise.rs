@@ -6,7 +6,7 @@
 //! Nagel et al. 2019, cross-layer equalisation). Neurons along residual blocks share their factors,
 //! because skip paths add them.
 //!
-//! With e for how far a neuron goes from zero, its factor is e^−¾, over the layer's geometric mean.
+//! With e for how far a neuron goes from zero, its factor is e^−½, over the layer's geometric mean.
 //! Not e^−1, which would make all ranges equal: the readers of a neuron that is seldom far from zero
 //! would have weights that their own rows' scale is too coarse for.
 
@@ -17,7 +17,7 @@ use crate::topology::{LayerShape, Topology};
 const MOST: f32 = 16.0;
 
 /// How much of the way to one range neurons go, in logarithms.
-const SHARE: f32 = 0.75;
+const SHARE: f32 = 0.5;
 
 /// Multiplies neurons by factors that bring `extents`, the largest size of each layer's neurons, near
 /// each other. Layers in fp16 and those of other activations stay.
