@@ -9,7 +9,8 @@ both walk the same path until rounding parts them: the mean loss of the first tw
 or the script ends with 1. Then, for every time given with --seconds, each gets as many steps as it makes in
 that time, with the whole fall of the learning rate over them, and the PSNR of all mips and channels is
 taken with rounded latents, the real synthesizer and outputs rounded to 8 bits. Steps per second and that
-PSNR are the result; the ratio is ours over PyTorch's.
+PSNR are the result; the ratio is ours over PyTorch's. For this both start at random and take Adam; a third
+run, of as many steps as the trainer makes in that time, starts and moves as the trainer does by default.
 
 PyTorch runs eagerly in f32 with fused Adam. The environment goes to `versus/` under the target folder.
 
@@ -369,15 +370,21 @@ def binary(arguments):
     return str(TARGET / "release" / "ntmu")
 
 
-def encode(program, folder, arguments, config_lines, steps, source):
-    """Trains `steps` steps in reals; the result, the log, and the seconds of the steps."""
+# What the PyTorch program does.
+ALIKE = f'''optimiser = "adam"
+rates = {{ latents = {RATES["latents"]}, synthesizer = {RATES["synthesizer"]} }}
+'''
+
+
+def encode(program, folder, arguments, steps, source, alike=True):
+    """Trains `steps` steps in reals, as the PyTorch program does or as by default; the result and the log."""
     plan, config = folder / "plan.toml", folder / "config.toml"
+    first = "random" if alike else "components"
     plan.write_text(
-        f'name = "reals"\n[[stage]]\ntrain = "latents"\nsteps = {steps}\nbatch = {arguments.batch}\n'
-        'warm_up = 100\nlatents = "noise"\nnumbers = "real"\n'
-        f'rates = {{ latents = {RATES["latents"]}, synthesizer = {RATES["synthesizer"]} }}\n'
+        f'name = "reals"\nfirst_latents = "{first}"\n[[stage]]\ntrain = "latents"\nsteps = {steps}\nbatch = {arguments.batch}\n'
+        f'warm_up = 100\nlatents = "noise"\nnumbers = "real"\n{ALIKE if alike else ""}'
     )
-    config.write_text("\n".join([*config_lines, f"checkpoint_every = {1 << 40}", ""]))
+    config.write_text(f"checkpoint_every = {1 << 40}\n")
     log, out = folder / "train.jsonl", folder / "out.ntx"
     log.unlink(missing_ok=True)
     command = [program, "encode", str(source), "-o", str(out), "--preset", arguments.preset, "--plan", str(plan),
@@ -401,7 +408,7 @@ def main():
         source = Path(arguments.set) if arguments.set else folder / "set"
         if not arguments.set:
             subprocess.run([program, "generate", "-o", str(source), "--size", "1024"], check=True, stdout=subprocess.DEVNULL)
-        measured, log = encode(program, folder, arguments, [], 10 * COMPARED, source)
+        measured, log = encode(program, folder, arguments, 10 * COMPARED, source)
         config = measured["training"]["config"]
         maps = [m["map"] for m in measured["quality"]["maps"]]
         setting = Setting(config, read_set(source, maps), arguments.seed, arguments.batch)
@@ -423,6 +430,11 @@ def main():
         stage = measured["training"]["stages"][0]
         speeds["ntmu"] = 10 * COMPARED / stage["seconds"]
 
+        def ours_in(steps, alike):
+            result, _ = encode(program, folder, arguments, steps, source, alike)
+            training = result["training"]
+            return {"steps": steps, "seconds": training["stages"][0]["seconds"], "psnr": training["psnr_float"]}
+
         figures = []
         for seconds in arguments.seconds:
             steps = max(int(seconds * speeds["torch"]), 1)
@@ -435,15 +447,15 @@ def main():
             torch_figure = {"steps": steps, "seconds": took, "psnr": theirs.psnr()}
             # As long as the other took, at the speed of the run before.
             steps = max(int(took * speeds["ntmu"]), 1)
-            result, _ = encode(program, folder, arguments, [], steps, source)
-            took = result["training"]["stages"][0]["seconds"]
-            speeds["ntmu"] = steps / took
-            our_figure = {"steps": steps, "seconds": took, "psnr": result["training"]["psnr_float"]}
-            figures.append({"seconds": seconds, "ntmu": our_figure, "torch": torch_figure,
+            our_figure = ours_in(steps, True)
+            speeds["ntmu"] = steps / our_figure["seconds"]
+            default_figure = ours_in(steps, False)
+            figures.append({"seconds": seconds, "ntmu": our_figure, "torch": torch_figure, "ntmu_by_default": default_figure,
                             "steps_ratio": speeds["ntmu"] / speeds["torch"], "psnr_ahead": our_figure["psnr"] - torch_figure["psnr"]})
             print(f"{seconds:6.0f} s  ntmu {our_figure['steps']} steps, {our_figure['psnr']:.2f} dB   "
                   f"torch {torch_figure['steps']} steps, {torch_figure['psnr']:.2f} dB   "
-                  f"steps {figures[-1]['steps_ratio']:.2f} times, {figures[-1]['psnr_ahead']:+.2f} dB")
+                  f"steps {figures[-1]['steps_ratio']:.2f} times, {figures[-1]['psnr_ahead']:+.2f} dB; "
+                  f"by default {default_figure['psnr']:.2f} dB in {default_figure['seconds']:.0f} s")
     write(arguments.json, {"conditions": {**before, "load_average_after": os.getloadavg()}, "set": arguments.set or "built-in, 1024",
                            "preset": arguments.preset, "batch": arguments.batch, "threads": arguments.threads,
                            "agreement": apart, "figures": figures})
