@@ -3,6 +3,10 @@
 use crate::random::Stream;
 use crate::sampler::Texel;
 use crate::texels::Texels;
+use rayon::prelude::*;
+
+/// Texels that one task draws.
+const DRAWN_TOGETHER: usize = 1024;
 
 /// The mip of a texel: in proportion to the mips' areas, ⌊−log4 u⌋ with u uniform, or with
 /// probability `uniform` any mip alike.
@@ -79,9 +83,13 @@ impl Batch {
 
     /// Draws every texel from the whole set.
     pub(crate) fn draw(&mut self, stream: Stream, texels: &Texels, uniform: f64) {
-        for (index, texel) in self.texels.iter_mut().enumerate() {
-            *texel = draw_texel(stream, index as u64, texels, uniform);
-        }
+        let parts = self.texels.par_chunks_mut(DRAWN_TOGETHER).enumerate();
+        parts.for_each(|(part, drawn)| {
+            for (index, texel) in drawn.iter_mut().enumerate() {
+                let index = part * DRAWN_TOGETHER + index;
+                *texel = draw_texel(stream, index as u64, texels, uniform);
+            }
+        });
     }
 }
 

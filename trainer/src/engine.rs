@@ -15,6 +15,9 @@ use crate::tile::Workspace;
 use crate::topology::Topology;
 use rayon::prelude::*;
 
+/// Parameters whose gradients one task adds up.
+const SUMMED_TOGETHER: usize = 4096;
+
 /// What a pass reads.
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
@@ -89,14 +92,17 @@ impl Engine {
                 }
                 .run();
             });
-        let (first, rest) = self.chunks.split_at(1);
-        let sums = first.iter().map(|c| &c.gradient);
-        self.parameters.fill(0.0);
-        for gradient in sums.chain(rest.iter().map(|c| &c.gradient)) {
-            for (sum, g) in self.parameters.iter_mut().zip(gradient) {
-                *sum += g;
+        let parts = self.parameters.par_chunks_mut(SUMMED_TOGETHER).enumerate();
+        parts.for_each(|(part, sums)| {
+            sums.fill(0.0);
+            let start = part * SUMMED_TOGETHER;
+            for chunk in &self.chunks {
+                let gradient = &chunk.gradient[start..start + sums.len()];
+                for (sum, g) in sums.iter_mut().zip(gradient) {
+                    *sum += g;
+                }
             }
-        }
+        });
         self.chunks.iter().map(|c| c.error).sum::<f64>() * f64::from(scale)
     }
 
