@@ -1,4 +1,4 @@
-//! What the engine allocates. A file of its own: the allocator counts for the whole process.
+//! What the engine allocates. A file of its own: the allocator measures the whole process.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(
     unsafe_code,
@@ -15,22 +15,27 @@ use ntmu_isa::rescale::Requantizer;
 use ntmu_model::Request;
 use ntmu_model::engine::{Engine, Path};
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 struct Counting;
 
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+thread_local! {
+    /// Of this thread alone: the harness prints the other test's result from its own meanwhile.
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+/// Bytes of all threads together: a chain is decoded on several.
 static HELD: AtomicUsize = AtomicUsize::new(0);
 static MOST_HELD: AtomicUsize = AtomicUsize::new(0);
 
-/// The counters are one for all threads, so the tests take turns.
+/// What is held is one figure for all threads, so the tests take turns.
 static TURN: Mutex<()> = Mutex::new(());
 
 // SAFETY: every call goes to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
         let held = HELD.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
         MOST_HELD.fetch_max(held, Ordering::Relaxed);
         // SAFETY: the caller's promise is handed on.
@@ -68,11 +73,11 @@ fn a_texel_allocates_nothing_on_any_path_in_any_kind_and_with_any_requantiser() 
             let requests: Vec<Request> = (0..64)
                 .map(|i| Request::new(&asset.shape, i, i * 7 % 64, 0).unwrap())
                 .collect();
-            let before = ALLOCATIONS.load(Ordering::Relaxed);
+            let before = ALLOCATIONS.get();
             for &request in &requests {
                 engine.texel(&mut scratch, request, &mut codes);
             }
-            let after = ALLOCATIONS.load(Ordering::Relaxed);
+            let after = ALLOCATIONS.get();
             let what = format!("{} {} {}", kind.name, path.name(), requantizer.name());
             assert_eq!(after - before, 0, "{what}");
         }
