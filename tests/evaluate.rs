@@ -4,7 +4,7 @@
 mod support;
 
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use support::command::{folder, json, ntmu, stderr};
 
@@ -196,6 +196,74 @@ fn a_neural_point_leaves_its_asset_and_no_checkpoint() {
     let asset = ntmu::isa::Asset::from_bytes(&bytes).unwrap();
     assert_eq!(row["bppc"].as_f64(), Some(ntmu::quality::bppc(&asset)));
     assert_eq!(files_in(&results.join("unfinished")), [""; 0]);
+}
+
+#[cfg(feature = "train")]
+#[test]
+fn a_neural_point_killed_in_its_training_goes_on_from_its_checkpoint_to_the_same_bytes() {
+    let folder = folder();
+    let text = "name = 'p'\nsets = ['built-in 64']\n[[curve]]\nname = 'CNTC'\ncodec = 'neural'\n\
+                presets = ['cntc-16']\neffort = 'fast'\nconfig = { batch = 768, checkpoint_every = 10 }\n";
+    std::fs::write(folder.path().join("plan.toml"), text).unwrap();
+    let whole = json(&ntmu(
+        &["evaluate", "plan.toml", "-o", "whole", "--json"],
+        folder.path(),
+    ));
+    let unfinished = folder.path().join("killed/unfinished");
+    let checkpoint = || -> Option<(PathBuf, Vec<u8>)> {
+        let entries = std::fs::read_dir(&unfinished).ok()?;
+        let path = entries.map(|entry| entry.unwrap().path());
+        let mut paths = path.filter(|p| p.extension().is_some_and(|e| e == "checkpoint"));
+        let path = paths.next()?;
+        let bytes = std::fs::read(&path).ok()?;
+        Some((path, bytes))
+    };
+    let mut last = None;
+    for _kill in 0..3 {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_ntmu"))
+            .args(["evaluate", "plan.toml", "-o", "killed"])
+            .stderr(std::process::Stdio::null())
+            .stdout(std::process::Stdio::null())
+            .current_dir(folder.path())
+            .spawn()
+            .unwrap();
+        while checkpoint() == last {
+            assert!(child.try_wait().unwrap().is_none(), "it ended unkilled");
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        last = checkpoint();
+    }
+    let go_on = || {
+        ntmu(
+            &["evaluate", "plan.toml", "-o", "killed", "--json"],
+            folder.path(),
+        )
+    };
+    // That it goes on from the checkpoint shows where that is cut short.
+    let (path, bytes) = last.unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
+    let refused = go_on();
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(
+        stderr(&refused).contains("checkpoint"),
+        "{}",
+        stderr(&refused)
+    );
+    std::fs::write(&path, &bytes).unwrap();
+    let killed = json(&go_on());
+    assert_eq!(files_in(&unfinished), [""; 0]);
+    let asset = |name: &str| {
+        let points = folder.path().join(name).join("points");
+        let names = files_in(&points);
+        let found = names.iter().find(|name| name.ends_with(".ntx")).unwrap();
+        std::fs::read(points.join(found)).unwrap()
+    };
+    assert!(asset("killed") == asset("whole"), "other bytes");
+    let psnr = |summary: &Value| summary["sets"][0]["rows"][0]["psnr"].clone();
+    assert!(psnr(&killed).is_f64(), "{killed}");
+    assert_eq!(psnr(&killed), psnr(&whole));
 }
 
 #[test]

@@ -18,7 +18,7 @@ pub(super) struct Trained {
     pub(super) bits: u64,
     /// See [`crate::quality::bppc`].
     pub(super) bppc: f64,
-    /// Seconds of training, of this process.
+    /// Seconds of training, in however many processes.
     pub(super) encode_seconds: f64,
     /// Seconds of decoding all mips.
     pub(super) decode_seconds: f64,
@@ -84,7 +84,6 @@ mod with_trainer {
     ) -> Result<Trained, EvaluateError> {
         let config = config(codec)?;
         let source = training_source(set);
-        let started = Instant::now();
         let trained = trainer::train(
             &source,
             &config,
@@ -94,7 +93,6 @@ mod with_trainer {
             stop,
             &mut |progress| after_step(progress.done as usize, progress.total as usize),
         )?;
-        let encode_seconds = started.elapsed().as_secs_f64();
         let asset = &trained.asset;
         let started = Instant::now();
         let mips = Decoded::of(asset, |_| ()).reals(&asset.shape);
@@ -105,7 +103,7 @@ mod with_trainer {
             mips,
             bits: asset.grid_bits() + asset.parameter_bits(),
             bppc: quality::bppc(asset),
-            encode_seconds,
+            encode_seconds: trained.report.seconds,
             decode_seconds,
             report: report.map_err(|error| refuse(codec, "report", error.to_string(), "JSON"))?,
         })

@@ -96,6 +96,8 @@ pub struct TrainReport {
     pub backend: Backend,
     /// Its adapter; the processor has none.
     pub adapter: Option<String>,
+    /// Seconds of the run, those of the processes that it was resumed from included.
+    pub seconds: f64,
     /// The stages that ran.
     pub stages: Vec<StageReport>,
     /// The configuration.

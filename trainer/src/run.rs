@@ -57,7 +57,7 @@ pub(crate) struct Run<'a> {
     /// Whether the asset reached the target.
     reached: bool,
     reports: Vec<StageReport>,
-    /// When this process began, less what earlier ones took.
+    /// When this process began, and what earlier ones took, in seconds.
     started: Instant,
     earlier: f64,
 }
@@ -69,6 +69,7 @@ impl<'a> Run<'a> {
         stages: Vec<Stage>,
         device: &'a TrainingDevice,
         (position, identity): (Position, u64),
+        started: Instant,
     ) -> Run<'a> {
         Run {
             ground,
@@ -84,7 +85,7 @@ impl<'a> Run<'a> {
             good: None,
             reached: false,
             reports: Vec::new(),
-            started: Instant::now(),
+            started,
         }
     }
 
@@ -127,12 +128,17 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    /// Seconds since the run began.
+    fn seconds(&self) -> f64 {
+        self.earlier + self.started.elapsed().as_secs_f64()
+    }
+
     /// Fits the stages from `index` on into what is left of the time.
     fn refit(&mut self, index: usize) {
         let (Some(budget), Some(last)) = (&self.budget, self.reports.last()) else {
             return;
         };
-        let spent = self.earlier + self.started.elapsed().as_secs_f64();
+        let spent = self.seconds();
         budget.refit(&mut self.stages, index, spent, last.seconds);
         self.position.steps = self.stages.iter().map(|s| s.steps).collect();
     }
@@ -188,7 +194,7 @@ impl<'a> Run<'a> {
                 stepper.step(&self.ground, &mut self.model, stage, step, rates)?;
             }
             self.position.step = step + 1;
-            self.position.seconds = self.earlier + self.started.elapsed().as_secs_f64();
+            self.position.seconds = self.seconds();
             if self.needs_losses(stage) {
                 self.read_losses(stage)?;
             }
@@ -370,6 +376,7 @@ impl<'a> Run<'a> {
 
     pub(crate) fn finish(mut self) -> Result<Trained, TrainError> {
         let errors = self.model.evaluate(&self.ground, Numbers::Integer);
+        let seconds = self.seconds();
         let Run {
             ground,
             model,
@@ -405,6 +412,7 @@ impl<'a> Run<'a> {
             seed: ground.config.seed,
             backend: device.backend(),
             adapter: device.adapter().map(str::to_owned),
+            seconds,
             stages: reports,
             config: ground.config.clone(),
         };

@@ -99,12 +99,12 @@ pub fn watched(
                 psnr_float: 0.0,
                 loss: f64::NAN,
                 least: f64::NAN,
-                seconds: started.elapsed().as_secs_f64(),
+                seconds: 0.0,
                 steps: stages.iter().map(|s| s.steps).collect(),
             }
         }
     };
-    let mut run = Run::new(ground, model, stages, device, (position, identity));
+    let mut run = Run::new(ground, model, stages, device, (position, identity), started);
     run.checkpoint = checkpoint;
     run.budget = budget;
     run.all_stages(stop, watch)?;
