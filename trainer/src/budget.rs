@@ -40,7 +40,7 @@ pub(crate) struct Budget {
     seconds: f64,
     /// Seconds of a step of each stage, as measured before the first.
     costs: Vec<f64>,
-    /// Seconds that a look at the whole set takes when the run is over.
+    /// Seconds that looking at the whole set takes when the run is over.
     ending: f64,
 }
 
@@ -60,7 +60,8 @@ impl Budget {
         let mut scratch = model.clone();
         let evaluation = Instant::now();
         scratch.evaluate(ground, Numbers::Real);
-        let ending = evaluation.elapsed().as_secs_f64();
+        // In reals, and in the numbers of the decode.
+        let ending = 2.0 * evaluation.elapsed().as_secs_f64();
         let mut budget = Budget {
             seconds,
             costs: Vec::new(),
@@ -92,9 +93,8 @@ impl Budget {
         device: &TrainingDevice,
         started: Instant,
     ) -> Result<f64, TrainError> {
-        // What happens once between stages: the first look at the set, the encoding of it, the
-        // ranges of the registers.
-        let mut between = self.ending;
+        // What happens once between stages: the encoding of the set, the ranges of the registers.
+        let mut between = 0.0;
         let running = stages.iter().filter(|s| s.steps > 0).count().max(1);
         let share = (MEASURING * self.seconds / running as f64).min(MOST);
         self.costs.clear();

@@ -154,7 +154,6 @@ impl TrainConfig {
         range("encoder_rate", self.encoder_rate, 0.0, 1.0)?;
         range("latent_rate", self.latent_rate, 0.0, 1.0)?;
         range("synthesizer_rate", self.synthesizer_rate, 0.0, 1.0)?;
-        range("integer_rate", self.integer_rate, 0.0, 10.0)?;
         range("checkpoint_every", self.checkpoint_every, 1, u64::MAX)?;
         range("effort", self.effort, 0, 100)?;
         range("rate_factor", self.rate_factor, 0.0, 10.0)?;

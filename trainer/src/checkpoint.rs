@@ -1,8 +1,8 @@
 //! Checkpoint: the state between two steps, as a file.
 //!
 //! ```text
-//! "NTMUCKP2"  identity u64  stage u32  step u64
-//! psnr_float f64  loss f64  least f64  seconds f64
+//! "NTMUCKP3"  identity u64  stage u32  step u64
+//! loss f64  least f64  seconds f64
 //! stages u32  then for each: steps u64
 //! count u32   then for each array: length u64, that many f32
 //! CRC-32 of everything before it
@@ -17,7 +17,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-const MAGIC: &[u8; 8] = b"NTMUCKP2";
+const MAGIC: &[u8; 8] = b"NTMUCKP3";
 
 /// Where a run is, between two steps.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,8 +26,6 @@ pub(crate) struct Position {
     pub(crate) stage: usize,
     /// Steps done in the stage.
     pub(crate) step: u64,
-    /// What the last stage in reals ended with; 0 before.
-    pub(crate) psnr_float: f64,
     /// The smoothed loss in this stage, and the least that it was; no numbers before its first step.
     pub(crate) loss: f64,
     pub(crate) least: f64,
@@ -162,13 +160,12 @@ fn put(path: &Path, identity: u64, position: &Position, model: &Model) -> std::i
     file.put(&(position.stage as u32).to_le_bytes())?;
     file.put(&position.step.to_le_bytes())?;
     let Position {
-        psnr_float,
         loss,
         least,
         seconds,
         ..
     } = position;
-    for value in [psnr_float, loss, least, seconds] {
+    for value in [loss, least, seconds] {
         file.put(&value.to_le_bytes())?;
     }
     file.put(&(position.steps.len() as u32).to_le_bytes())?;
@@ -281,8 +278,7 @@ pub(crate) fn read(
     }
     let stage = reader.u32()? as usize;
     let step = reader.u64()?;
-    let [psnr_float, loss, least, seconds] =
-        [reader.f64()?, reader.f64()?, reader.f64()?, reader.f64()?];
+    let [loss, least, seconds] = [reader.f64()?, reader.f64()?, reader.f64()?];
     let found = reader.u32()? as usize;
     if found != stages {
         return Err(reader.refuse(format!("{found} stages"), stages.to_string()));
@@ -321,7 +317,6 @@ pub(crate) fn read(
     Ok(Position {
         stage,
         step,
-        psnr_float,
         loss,
         least,
         seconds,

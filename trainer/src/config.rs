@@ -92,11 +92,9 @@ pub struct TrainConfig {
     /// stage of n < 4,000 steps takes √(4,000 ∕ n) times as much.
     pub latent_rate: f64,
     /// Learning rate of the synthesizer. Where the plan has no rate of its own and there are two
-    /// residual blocks or more, a stage of n > 2,000 steps takes √(2,000 ∕ n) of it, and layers of
+    /// residual blocks or more, a fall of n > 2,000 steps takes √(2,000 ∕ n) of it, and layers of
     /// w > 64 take 64 ∕ w.
     pub synthesizer_rate: f64,
-    /// All rates in the deployed stage of the plan that follows from an effort, as a factor.
-    pub integer_rate: f64,
     /// All rates of every stage, as a factor. A run may be resumed with another: it is the way on
     /// after a divergence.
     pub rate_factor: f64,

@@ -102,6 +102,11 @@ pub struct StagePlan {
     /// How they go on.
     #[serde(default)]
     pub fall: Fall,
+    /// The part of the fall that the stage covers, from the first number to the second of 0..=1.
+    /// Stages that follow each other in one fall end lower than after a fall each. Rules of rates by
+    /// length count the steps of the whole fall at the stage's pace.
+    #[serde(default = "whole", skip_serializing_if = "is_whole")]
+    pub part: [f64; 2],
     /// Steps over which they rise from nothing, at most a tenth of the stage.
     #[serde(default)]
     pub warm_up: u64,
@@ -125,6 +130,14 @@ pub struct StagePlan {
 
 const fn one() -> f64 {
     1.0
+}
+
+const fn whole() -> [f64; 2] {
+    [0.0, 1.0]
+}
+
+fn is_whole(part: &[f64; 2]) -> bool {
+    *part == whole()
 }
 
 /// What a run trains, stage after stage.
@@ -265,6 +278,14 @@ impl StagePlan {
             range(field(name), rate.unwrap_or(0.0), 0.0, 1.0)?;
         }
         range(field("rate_factor"), self.rate_factor, 0.0, 10.0)?;
+        let [from, to] = self.part;
+        if !(0.0 <= from && to <= 1.0 && to - from >= LEAST_PART) {
+            return Err(TrainError::config(
+                field("part"),
+                format!("{from} to {to}"),
+                format!("0 to 1, the second at least {LEAST_PART} above the first"),
+            ));
+        }
         if let Some(crop) = self.crop {
             check_crop(&field("crop"), crop)?;
         }
@@ -288,6 +309,9 @@ impl StagePlan {
         Ok(())
     }
 }
+
+/// The least part of a fall that a stage covers.
+const LEAST_PART: f64 = 0.001;
 
 /// The most steps of a stage.
 const MOST_STEPS: u64 = 100_000_000;
@@ -313,6 +337,31 @@ mod tests {
             assert_eq!(Plan::parse(&text).unwrap(), plan);
             let text = serde_json::to_string(&plan).unwrap();
             assert_eq!(serde_json::from_str::<Plan>(&text).unwrap(), plan);
+        }
+    }
+
+    #[test]
+    fn a_part_that_is_none_is_refused() {
+        for (part, good) in [
+            ("0.0, 1.0", true),
+            ("0.75, 1.0", true),
+            ("0.5, 0.5", false),
+            ("0.6, 0.5", false),
+            ("-0.1, 0.5", false),
+            ("0.5, 1.1", false),
+            ("nan, 1.0", false),
+        ] {
+            let text = format!(
+                "name = \"t\"\n[[stage]]\ntrain = \"latents\"\nsteps = 3\nlatents = \"noise\"\n\
+                 numbers = \"real\"\npart = [{part}]\n"
+            );
+            match Plan::parse(&text) {
+                Ok(_) => assert!(good, "{part}"),
+                Err(error) => {
+                    assert!(!good, "{part}: {error}");
+                    assert!(error.to_string().contains("stage[0].part"), "{error}");
+                }
+            }
         }
     }
 

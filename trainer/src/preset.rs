@@ -83,7 +83,6 @@ impl Preset {
             encoder_rate: 1e-3,
             latent_rate: 0.005,
             synthesizer_rate: 0.02,
-            integer_rate: 0.6,
             rate_factor: 1.0,
             weights: BTreeMap::new(),
             effort: 50,

@@ -71,9 +71,9 @@ pub struct StageReport {
 /// What a finished run says about itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrainReport {
-    /// Decibels over every texel of every mip and channel (the paper's measure) of the network in
-    /// reals with rounded latents, as the last stage in reals left it, its outputs rounded to the
-    /// set's codes. Here and below, a texel that is masked out does not count.
+    /// Decibels over every texel of every mip and channel (the paper's measure) of the asset's
+    /// network in reals: its parameters before they are rounded, the same latents, outputs rounded to
+    /// the set's codes. Here and below, a texel that is masked out does not count.
     pub psnr_float: f64,
     /// The same of the asset: the decode's own numbers throughout, codes compared with the source's
     /// reals.

@@ -123,7 +123,7 @@ impl<'a> Run<'a> {
             }
         }
         if self.model.ranges.is_empty() {
-            self.deploy();
+            self.model.deploy(&self.ground);
         }
         Ok(())
     }
@@ -157,16 +157,9 @@ impl<'a> Run<'a> {
             if stage.train == Train::Encoder && stage.steps > 0 {
                 self.model.encode_whole(&self.ground)?;
             }
-            self.deploy();
+            self.model.deploy(&self.ground);
         }
         Ok(())
-    }
-
-    /// From reals to the numbers of the decode.
-    fn deploy(&mut self) {
-        let errors = self.model.evaluate(&self.ground, Numbers::Real);
-        self.position.psnr_float = decibels(errors.overall());
-        self.model.deploy(&self.ground);
     }
 
     fn steps(
@@ -375,6 +368,7 @@ impl<'a> Run<'a> {
     }
 
     pub(crate) fn finish(mut self) -> Result<Trained, TrainError> {
+        let psnr_float = decibels(self.model.evaluate(&self.ground, Numbers::Real).overall());
         let errors = self.model.evaluate(&self.ground, Numbers::Integer);
         let seconds = self.seconds();
         let Run {
@@ -382,19 +376,18 @@ impl<'a> Run<'a> {
             model,
             stages,
             device,
-            position,
             reports,
             ..
         } = self;
         let psnr_quantised = decibels(errors.overall());
-        let psnrs = [position.psnr_float, psnr_quantised];
+        let psnrs = [psnr_float, psnr_quantised];
         let record = record::of(ground.config, &stages, device, psnrs);
         let asset = asset_of(&model, &ground, record)?;
         let (width, height) = ground.texels.sizes[0];
         let texels = f64::from(width) * f64::from(height);
         let bits = (asset.grid_bits() + asset.parameter_bits()) as f64;
         let report = TrainReport {
-            psnr_float: position.psnr_float,
+            psnr_float,
             psnr_quantised,
             psnr_channels: (0..ground.texels.channels)
                 .map(|c| decibels(errors.channel(c)))

@@ -84,20 +84,20 @@ pub(crate) fn batch_of_run(texels: u64) -> usize {
     steady.max(SMALL_BATCH) as usize
 }
 
-/// The steps of a stage up to which a deep synthesizer takes its whole learning rate.
-const SHORT_STAGE: f64 = 2000.0;
+/// The steps of a fall up to which a deep synthesizer takes its whole learning rate.
+const SHORT_FALL: f64 = 2000.0;
 
-/// The share of its learning rate that a deep synthesizer takes in a stage of so many steps.
-pub(crate) fn ease(steps: u64) -> f64 {
-    (SHORT_STAGE / steps as f64).sqrt().min(1.0)
+/// The share of its learning rate that a deep synthesizer takes in a fall of so many steps.
+pub(crate) fn ease(steps: f64) -> f64 {
+    (SHORT_FALL / steps).sqrt().min(1.0)
 }
 
-/// The steps of a stage from which on latents have the time to come where they belong.
-const LONG_STAGE: f64 = 4000.0;
+/// The steps of a fall from which on latents have the time to come where they belong.
+const LONG_FALL: f64 = 4000.0;
 
-/// How many times their learning rate latents take in a stage of so many steps.
-pub(crate) fn haste(steps: u64) -> f64 {
-    (LONG_STAGE / steps.max(1) as f64).sqrt().max(1.0)
+/// How many times their learning rate latents take in a fall of so many steps.
+pub(crate) fn haste(steps: f64) -> f64 {
+    (LONG_FALL / steps.max(1.0)).sqrt().max(1.0)
 }
 
 /// Whether the plan is that of an effort, with whatever steps.
@@ -134,7 +134,8 @@ impl TrainConfig {
 
 impl TrainConfig {
     /// The plan that an effort gives, with these steps: encoder, latents in reals, latents in the
-    /// numbers of the decode.
+    /// numbers of the decode. The last two share one fall of the rates: the first half of it
+    /// and the second, whatever their steps.
     #[must_use]
     pub fn usual_plan(&self, [encoder, latents, deployed]: [u64; 3]) -> Plan {
         let stage = |train, steps, latents, numbers| StagePlan {
@@ -147,6 +148,7 @@ impl TrainConfig {
             optimiser: None,
             rate_factor: 1.0,
             fall: Fall::Cosine,
+            part: [0.0, 1.0],
             warm_up: WARM_UP,
             crop: None,
             crops: None,
@@ -154,22 +156,26 @@ impl TrainConfig {
             mips: Mips::Corners,
             uniform_mips: None,
         };
-        let last = stage(
-            Train::Latents,
-            deployed,
-            Shown::Rounded,
-            Arithmetic::Deployed,
-        );
+        let [mut first, mut last] = [
+            stage(Train::Latents, latents, Shown::Noise, Arithmetic::Real),
+            stage(
+                Train::Latents,
+                deployed,
+                Shown::Rounded,
+                Arithmetic::Deployed,
+            ),
+        ];
+        if latents > 0 && deployed > 0 {
+            first.part = [0.0, BETWEEN];
+            last.part = [BETWEEN, 1.0];
+        }
         Plan {
             first_latents: None,
             name: USUAL.to_owned(),
             stage: vec![
                 stage(Train::Encoder, encoder, Shown::Noise, Arithmetic::Real),
-                stage(Train::Latents, latents, Shown::Noise, Arithmetic::Real),
-                StagePlan {
-                    rate_factor: self.integer_rate,
-                    ..last
-                },
+                first,
+                last,
             ],
         }
     }
@@ -177,6 +183,10 @@ impl TrainConfig {
 
 /// The name of the plan that an effort gives.
 pub(crate) const USUAL: &str = "effort";
+
+/// Where in the fall of the rates an effort's integer stage takes over: before reals have settled
+/// where integers would have to leave again. Its fewer steps fall faster.
+const BETWEEN: f64 = 0.5;
 
 /// Steps over which a rate rises from nothing.
 const WARM_UP: u64 = 100;
@@ -189,14 +199,11 @@ pub(crate) fn fall(at: f64) -> f64 {
     FLOOR + (1.0 - FLOOR) * 0.5 * (1.0 + (std::f64::consts::PI * at.clamp(0.0, 1.0)).cos())
 }
 
-/// The factor at step `step` (from 0) of `steps`, with a warm-up of at most a tenth of them.
-pub(crate) fn factor(how: Fall, warm_up: u64, step: u64, steps: u64) -> f64 {
+/// The factor of a learning rate at step `step` (from 0) of `steps` because of a warm-up, of at most a
+/// tenth of them.
+pub(crate) fn rise(warm_up: u64, step: u64, steps: u64) -> f64 {
     let warm = (warm_up as f64).min(0.1 * steps as f64).max(1.0);
-    let rise = ((step + 1) as f64 / warm).min(1.0);
-    match how {
-        Fall::Constant => rise,
-        Fall::Cosine => rise * fall(step as f64 / steps.max(1) as f64),
-    }
+    ((step + 1) as f64 / warm).min(1.0)
 }
 
 #[cfg(test)]
@@ -204,20 +211,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_factor_rises_falls_and_stays_positive() {
-        let of = |step| factor(Fall::Cosine, WARM_UP, step, 10_000);
-        assert!(of(0) < of(50) && of(50) < of(100));
-        assert!(of(100) > of(5000) && of(5000) > of(9999));
-        assert!((0..10_000).all(|s| of(s) > 0.0 && of(s) <= 1.0));
-        assert!(factor(Fall::Cosine, WARM_UP, 0, 1) > 0.0);
-    }
-
-    #[test]
-    fn a_constant_rate_without_a_warm_up_is_the_rate_at_every_step() {
-        for (step, steps) in [(0, 1), (0, 1000), (500, 1000), (999, 1000)] {
-            assert_eq!(factor(Fall::Constant, 0, step, steps), 1.0);
-        }
-        assert!(factor(Fall::Constant, 100, 0, 1000) < factor(Fall::Constant, 100, 99, 1000));
+    fn a_rate_rises_to_the_whole_and_falls_to_the_floor() {
+        let of = |step| rise(WARM_UP, step, 10_000);
+        assert!(of(0) > 0.0 && of(0) < of(50) && of(50) < of(99));
+        assert!((99..10_000).all(|step| of(step) == 1.0));
+        assert_eq!(rise(WARM_UP, 0, 1), 1.0);
+        assert_eq!(fall(0.0), 1.0);
+        assert!((fall(1.0) - FLOOR).abs() < 1e-12);
+        assert!((1..=100).all(|i| fall(0.01 * f64::from(i)) < fall(0.01 * f64::from(i - 1))));
     }
 
     #[test]

@@ -44,6 +44,8 @@ pub struct Stage {
     pub rate_factor: f64,
     /// How they go on.
     pub fall: Fall,
+    /// The part of the fall that the stage covers.
+    pub part: [f64; 2],
     /// Steps over which they rise.
     pub warm_up: u64,
     /// Side of a crop.
@@ -75,7 +77,8 @@ impl Stage {
     /// The learning rates at step `step`, from 0.
     #[must_use]
     pub fn rates_at(&self, step: u64) -> Rates {
-        let factor = self.rate_factor * schedule::factor(self.fall, self.warm_up, step, self.steps);
+        let rise = schedule::rise(self.warm_up, step, self.steps);
+        let factor = self.rate_factor * rise * self.fallen(step);
         Rates {
             encoder: factor * self.rates.encoder,
             latents: factor * self.of_length(self.hastens, schedule::haste) * self.rates.latents,
@@ -85,9 +88,26 @@ impl Stage {
         }
     }
 
-    /// What a rate is multiplied with because of the stage's length, where it is.
-    fn of_length(&self, follows: bool, rule: impl Fn(u64) -> f64) -> f64 {
-        if follows { rule(self.steps) } else { 1.0 }
+    /// What the fall has left of a rate at step `step`.
+    fn fallen(&self, step: u64) -> f64 {
+        let [from, to] = self.part;
+        match self.fall {
+            Fall::Constant => 1.0,
+            Fall::Cosine => {
+                let at = step as f64 / self.steps.max(1) as f64;
+                schedule::fall(from + (to - from) * at)
+            }
+        }
+    }
+
+    /// What a rate is multiplied with because of the length of the fall, where it is.
+    fn of_length(&self, follows: bool, rule: impl Fn(f64) -> f64) -> f64 {
+        let [from, to] = self.part;
+        if follows {
+            rule(self.steps as f64 / (to - from))
+        } else {
+            1.0
+        }
     }
 
     /// The number of a step's random streams: no two stages share one.
@@ -173,6 +193,7 @@ fn one(config: &TrainConfig, index: u32, stage: &StagePlan, crop: u32, batch: us
         optimiser: stage.optimiser.unwrap_or(config.optimiser),
         rate_factor: stage.rate_factor * config.rate_factor,
         fall: stage.fall,
+        part: stage.part,
         warm_up: stage.warm_up,
         crop,
         crops: stage.crops.unwrap_or(config.crops),
@@ -197,6 +218,31 @@ mod tests {
             ..Preset::ALL[0].config()
         };
         config.stages(&sizes(side)).unwrap()
+    }
+
+    #[test]
+    fn stages_in_parts_of_a_fall_take_the_rates_of_one_stage() {
+        let config = Preset::ALL[0].config();
+        let of = |plan: Plan| {
+            let config = TrainConfig {
+                plan: Some(plan),
+                ..config.clone()
+            };
+            config.stages(&sizes(64)).unwrap()
+        };
+        let parts = of(config.usual_plan([0, 5000, 5000]));
+        let whole = of(config.usual_plan([0, 10_000, 0]));
+        let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b;
+        for (stage, step, at) in [
+            (1, 200, 200),
+            (1, 4999, 4999),
+            (2, 100, 5100),
+            (2, 4999, 9999),
+        ] {
+            let (found, one) = (parts[stage].rates_at(step), whole[1].rates_at(at));
+            assert!(close(found.latents, one.latents), "{stage} {step}");
+            assert!(close(found.synthesizer, one.synthesizer), "{stage} {step}");
+        }
     }
 
     #[test]

@@ -96,7 +96,6 @@ pub fn watched(
             Position {
                 stage: 0,
                 step: 0,
-                psnr_float: 0.0,
                 loss: f64::NAN,
                 least: f64::NAN,
                 seconds: 0.0,

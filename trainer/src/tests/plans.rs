@@ -189,6 +189,6 @@ fn the_usual_plan_is_what_it_always_was() {
         of(2),
         (Train::Latents, Shown::Rounded, Arithmetic::Deployed)
     );
-    assert_eq!(stages[2].rate_factor, 0.6);
+    assert_eq!([stages[1].part, stages[2].part], [[0.0, 0.5], [0.5, 1.0]]);
     assert!(stages.iter().all(|s| s.mips == Mips::Corners));
 }

@@ -102,7 +102,6 @@ fn a_loss_that_is_no_number_names_its_step() {
     let position = checkpoint::Position {
         stage: 1,
         step: 5,
-        psnr_float: 0.0,
         loss: 0.1,
         least: 0.1,
         seconds: 0.0,
