@@ -119,14 +119,15 @@ impl Budget {
     }
 
     /// Fits the stages from `next` on again, after `spent` seconds, now that the stage before is
-    /// known to have taken `taken` seconds.
+    /// known to have taken `taken` seconds. One that took less than expected leaves its time to them,
+    /// but does not make them faster: too long a run is worse than too short a one.
     pub(crate) fn refit(&self, stages: &mut [Stage], next: usize, spent: f64, taken: f64) {
         let Some(before) = next.checked_sub(1) else {
             return;
         };
         let expected = self.costs[before] * stages[before].steps as f64;
         let slower = if expected > 0.0 {
-            taken / expected
+            (taken / expected).max(1.0)
         } else {
             1.0
         };
@@ -217,6 +218,9 @@ mod tests {
         let mut gone = stages([0, 6000, 1500]);
         budget.refit(&mut gone, 2, 200.0, 60.0);
         assert_eq!(gone[2].steps, 375);
+        let mut early = stages([0, 6000, 1500]);
+        budget.refit(&mut early, 2, 35.0, 30.0);
+        assert_eq!(early[2].steps, 3000);
         let mut on_time = stages([0, 6000, 1500]);
         budget.refit(&mut on_time, 2, 65.0, 60.0);
         assert_eq!(on_time[2].steps, 1500);

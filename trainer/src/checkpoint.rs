@@ -3,7 +3,7 @@
 //! ```text
 //! "NTMUCKP3"  identity u64  stage u32  step u64
 //! loss f64  least f64  seconds f64
-//! stages u32  then for each: steps u64
+//! stages u32  then for each: steps u64  batch u64
 //! count u32   then for each array: length u64, that many f32
 //! CRC-32 of everything before it
 //! ```
@@ -13,6 +13,7 @@
 use crate::error::TrainError;
 use crate::model::{Ground, Model};
 use crate::quantise::Range;
+use crate::stage::Stage;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -31,8 +32,25 @@ pub(crate) struct Position {
     pub(crate) least: f64,
     /// Seconds that the run has taken so far.
     pub(crate) seconds: f64,
-    /// Steps of each stage that runs: a budget of time fixed them.
-    pub(crate) steps: Vec<u64>,
+    /// What a budget of time has fixed of each stage that runs.
+    pub(crate) extents: Vec<Extent>,
+}
+
+/// How much a stage does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Extent {
+    pub(crate) steps: u64,
+    /// Texels of a step.
+    pub(crate) batch: usize,
+}
+
+impl Extent {
+    pub(crate) fn of(stages: &[Stage]) -> Vec<Extent> {
+        let extents = stages
+            .iter()
+            .map(|&Stage { steps, batch, .. }| Extent { steps, batch });
+        extents.collect()
+    }
 }
 
 /// A number that two runs share exactly when they make the same asset.
@@ -168,9 +186,10 @@ fn put(path: &Path, identity: u64, position: &Position, model: &Model) -> std::i
     for value in [loss, least, seconds] {
         file.put(&value.to_le_bytes())?;
     }
-    file.put(&(position.steps.len() as u32).to_le_bytes())?;
-    for steps in &position.steps {
-        file.put(&steps.to_le_bytes())?;
+    file.put(&(position.extents.len() as u32).to_le_bytes())?;
+    for extent in &position.extents {
+        file.put(&extent.steps.to_le_bytes())?;
+        file.put(&(extent.batch as u64).to_le_bytes())?;
     }
     let ranges: Vec<f32> = model
         .ranges
@@ -245,12 +264,12 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Reads the state from `path` into `model`, which is a fresh one of the same run of `stages`
-/// stages.
+/// Reads the state from `path` into `model`, which is a fresh one of the same run, of these stages
+/// before any of them was fitted into a time.
 pub(crate) fn read(
     path: &Path,
     identity: u64,
-    stages: usize,
+    stages: &[Stage],
     model: &mut Model,
 ) -> Result<Position, TrainError> {
     let file = std::fs::read(path).map_err(|cause| TrainError::Io {
@@ -280,16 +299,28 @@ pub(crate) fn read(
     let step = reader.u64()?;
     let [loss, least, seconds] = [reader.f64()?, reader.f64()?, reader.f64()?];
     let found = reader.u32()? as usize;
-    if found != stages {
-        return Err(reader.refuse(format!("{found} stages"), stages.to_string()));
+    if found != stages.len() {
+        return Err(reader.refuse(format!("{found} stages"), stages.len().to_string()));
     }
-    let steps = (0..stages)
-        .map(|_| reader.u64())
-        .collect::<Result<Vec<_>, _>>()?;
-    match steps.get(stage) {
-        Some(&all) if step <= all => {}
-        Some(all) => return Err(reader.refuse(format!("step {step}"), format!("0..={all}"))),
-        None => return Err(reader.refuse(format!("stage {stage}"), format!("0..{stages}"))),
+    let mut extents = Vec::new();
+    for planned in stages {
+        let (steps, batch) = (reader.u64()?, reader.u64()? as usize);
+        if !(1..=planned.batch).contains(&batch) {
+            let allowed = format!("1..={}", planned.batch);
+            return Err(reader.refuse(format!("a batch of {batch}"), allowed));
+        }
+        extents.push(Extent { steps, batch });
+    }
+    match extents.get(stage) {
+        Some(extent) if step <= extent.steps => {}
+        Some(extent) => {
+            let allowed = format!("0..={}", extent.steps);
+            return Err(reader.refuse(format!("step {step}"), allowed));
+        }
+        None => {
+            let allowed = format!("0..{}", stages.len());
+            return Err(reader.refuse(format!("stage {stage}"), allowed));
+        }
     }
     let count = reader.u32()?;
     let targets = arrays_mut(model);
@@ -320,6 +351,6 @@ pub(crate) fn read(
         loss,
         least,
         seconds,
-        steps,
+        extents,
     })
 }

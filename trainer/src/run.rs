@@ -1,7 +1,7 @@
 //! The run: stage after stage, with checkpoints between steps.
 
 use crate::budget::Budget;
-use crate::checkpoint::{self, Position};
+use crate::checkpoint::{self, Extent, Position};
 use crate::device::TrainingDevice;
 use crate::error::{Good, TrainError};
 use crate::evaluate::decibels;
@@ -52,7 +52,7 @@ pub(crate) struct Run<'a> {
     pub(crate) checkpoint: Option<&'a Path>,
     /// In the process that measured it.
     pub(crate) budget: Option<Budget>,
-    /// What this process wrote last.
+    /// The last checkpoint.
     good: Option<Good>,
     /// Whether the asset reached the target.
     reached: bool,
@@ -128,6 +128,20 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    /// Notes the checkpoint that the run goes on from.
+    pub(crate) fn resumed_from(&mut self, path: &Path) {
+        self.good = Some(self.good_at(path));
+    }
+
+    /// The present position, kept in a file.
+    fn good_at(&self, path: &Path) -> Good {
+        Good {
+            path: path.to_owned(),
+            stage: self.stages[self.position.stage].name(),
+            step: self.position.step,
+        }
+    }
+
     /// Seconds since the run began.
     fn seconds(&self) -> f64 {
         self.earlier + self.started.elapsed().as_secs_f64()
@@ -140,7 +154,7 @@ impl<'a> Run<'a> {
         };
         let spent = self.seconds();
         budget.refit(&mut self.stages, index, spent, last.seconds);
-        self.position.steps = self.stages.iter().map(|s| s.steps).collect();
+        self.position.extents = Extent::of(&self.stages);
     }
 
     /// What happens once, before the first step of a stage.
@@ -148,12 +162,8 @@ impl<'a> Run<'a> {
         self.model.forget_moments();
         self.position.loss = f64::NAN;
         self.position.least = f64::NAN;
-        let follows_reals = self.position.stage == 0
-            || self
-                .stages
-                .get(self.position.stage - 1)
-                .is_some_and(|before| !before.is_deployed());
-        if stage.is_deployed() && follows_reals {
+        // Once: a run that was interrupted before the stage's first step comes here again.
+        if stage.is_deployed() && self.model.ranges.is_empty() {
             if stage.train == Train::Encoder && stage.steps > 0 {
                 self.model.encode_whole(&self.ground)?;
             }
@@ -359,11 +369,7 @@ impl<'a> Run<'a> {
 
     fn save(&mut self, path: &Path) -> Result<(), TrainError> {
         checkpoint::write(path, self.identity, &self.position, &self.model)?;
-        self.good = Some(Good {
-            path: path.to_owned(),
-            stage: self.stages[self.position.stage].name(),
-            step: self.position.step,
-        });
+        self.good = Some(self.good_at(path));
         Ok(())
     }
 

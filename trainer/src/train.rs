@@ -1,7 +1,7 @@
 //! Train: the front door of a run.
 
 use crate::budget::Budget;
-use crate::checkpoint::{self, Position};
+use crate::checkpoint::{self, Extent, Position};
 use crate::choices::FirstLatents;
 use crate::config::TrainConfig;
 use crate::device::TrainingDevice;
@@ -70,21 +70,23 @@ pub fn watched(
     let ground = Ground::new(config, source)?;
     let mut stages = config.stages(&ground.texels.sizes)?;
     let identity = checkpoint::identity(&ground)?;
+    let resumed = checkpoint.filter(|path| resume && path.exists());
     let mut model = Model::new(&ground)?;
     if stages
         .iter()
         .any(|s| s.train == Train::Encoder && s.steps > 0)
     {
         model.start_encoder(&ground);
-    } else if config.first_latents() == FirstLatents::Components {
+    } else if config.first_latents() == FirstLatents::Components && resumed.is_none() {
         first_latents::set(&ground, &mut model.latents);
     }
     let mut budget = None;
-    let position = match checkpoint.filter(|path| resume && path.exists()) {
+    let position = match resumed {
         Some(path) => {
-            let position = checkpoint::read(path, identity, stages.len(), &mut model)?;
-            for (stage, &steps) in stages.iter_mut().zip(&position.steps) {
-                stage.steps = steps;
+            let position = checkpoint::read(path, identity, &stages, &mut model)?;
+            for (stage, extent) in stages.iter_mut().zip(&position.extents) {
+                stage.steps = extent.steps;
+                stage.batch = extent.batch;
             }
             position
         }
@@ -99,13 +101,16 @@ pub fn watched(
                 loss: f64::NAN,
                 least: f64::NAN,
                 seconds: 0.0,
-                steps: stages.iter().map(|s| s.steps).collect(),
+                extents: Extent::of(&stages),
             }
         }
     };
     let mut run = Run::new(ground, model, stages, device, (position, identity), started);
     run.checkpoint = checkpoint;
     run.budget = budget;
+    if let Some(path) = resumed {
+        run.resumed_from(path);
+    }
     run.all_stages(stop, watch)?;
     run.finish()
 }

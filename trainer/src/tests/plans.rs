@@ -1,6 +1,6 @@
 //! Plans: every kind of stage does its part.
 
-use super::{run, small, source, usual};
+use super::{resumed, run, small, source, stopped_at, usual};
 use crate::plan::{Arithmetic, Plan, Shown, Train};
 use crate::{Mips, Precision, TrainConfig};
 
@@ -177,6 +177,35 @@ fn a_budget_of_time_fixes_steps_with_which_the_run_can_be_repeated() {
         ..timed
     };
     assert_eq!(run(&source, &repeated).unwrap().asset, first.asset);
+}
+
+#[test]
+fn a_run_that_a_time_gave_smaller_batches_keeps_them_when_it_is_resumed() {
+    let source = source(512, 512, 3);
+    let effort = TrainConfig {
+        plan: None,
+        effort: 70,
+        batch: 16128,
+        ..small()
+    };
+    let timed = TrainConfig {
+        seconds: Some(3.0),
+        ..effort.clone()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.checkpoint");
+    stopped_at(&source, &timed, &path, 20, false);
+    let resumed = resumed(&source, &timed, &path).unwrap();
+    let stage = resumed.report.stages[0].stage;
+    let unfitted = effort.stages(&[(512, 512)]).unwrap();
+    assert!(stage.batch < unfitted[1].batch, "the time was enough");
+    let steps: [u64; 3] = resumed.report.steps.clone().try_into().unwrap();
+    let repeated = TrainConfig {
+        batch: stage.batch as u32,
+        plan: Some(effort.usual_plan(steps)),
+        ..effort
+    };
+    assert_eq!(run(&source, &repeated).unwrap().asset, resumed.asset);
 }
 
 #[test]

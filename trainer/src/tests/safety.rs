@@ -17,7 +17,8 @@ fn a_run_stopped_in_every_stage_and_resumed_equals_the_uninterrupted_run() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
     let mut resume = false;
-    for at in [20, 60, 100] {
+    // Within the stages, and between them.
+    for at in [20, 40, 60, 80, 100] {
         let error = stopped_at(&source, &config, &path, at, resume);
         assert!(
             matches!(&error, TrainError::Stopped { checkpoint: Some(p), .. } if *p == path),
@@ -105,7 +106,7 @@ fn a_loss_that_is_no_number_names_its_step() {
         loss: 0.1,
         least: 0.1,
         seconds: 0.0,
-        steps: stages.iter().map(|s| s.steps).collect(),
+        extents: checkpoint::Extent::of(&stages),
     };
     let identity = checkpoint::identity(&ground).unwrap();
     model.start_encoder(&ground);
