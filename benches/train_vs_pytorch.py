@@ -456,7 +456,7 @@ def main():
                   f"torch {torch_figure['steps']} steps, {torch_figure['psnr']:.2f} dB   "
                   f"steps {figures[-1]['steps_ratio']:.2f} times, {figures[-1]['psnr_ahead']:+.2f} dB; "
                   f"by default {default_figure['psnr']:.2f} dB in {default_figure['seconds']:.0f} s")
-    write(arguments.json, {"conditions": {**before, "load_average_after": os.getloadavg()}, "set": arguments.set or "built-in, 1024",
+    write(arguments.json, {"conditions": {**before, "load_average_after": os.getloadavg()}, "set": Path(arguments.set).name if arguments.set else "built-in, 1024",
                            "preset": arguments.preset, "batch": arguments.batch, "threads": arguments.threads,
                            "agreement": apart, "figures": figures})
 
