@@ -4,7 +4,7 @@
 mod support;
 
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 use support::command::{folder, json, ntmu, stderr};
 
@@ -210,7 +210,7 @@ fn a_neural_point_killed_in_its_training_goes_on_from_its_checkpoint_to_the_same
         folder.path(),
     ));
     let unfinished = folder.path().join("killed/unfinished");
-    let checkpoint = || -> Option<(PathBuf, Vec<u8>)> {
+    let checkpoint = || -> Option<(std::path::PathBuf, Vec<u8>)> {
         let entries = std::fs::read_dir(&unfinished).ok()?;
         let path = entries.map(|entry| entry.unwrap().path());
         let mut paths = path.filter(|p| p.extension().is_some_and(|e| e == "checkpoint"));

@@ -166,8 +166,8 @@ impl TrainConfig {
             ),
         ];
         if latents > 0 && deployed > 0 {
-            first.part = [0.0, BETWEEN];
-            last.part = [BETWEEN, 1.0];
+            first.part = [0.0, INTEGERS_FROM];
+            last.part = [INTEGERS_FROM, 1.0];
         }
         Plan {
             first_latents: None,
@@ -186,7 +186,7 @@ pub(crate) const USUAL: &str = "effort";
 
 /// Where in the fall of the rates an effort's integer stage takes over: before reals have settled
 /// where integers would have to leave again. Its fewer steps fall faster.
-const BETWEEN: f64 = 0.5;
+const INTEGERS_FROM: f64 = 0.5;
 
 /// Steps over which a rate rises from nothing.
 const WARM_UP: u64 = 100;
