@@ -4,13 +4,11 @@
 
 use ntmu::isa::activation::Activation;
 use ntmu::isa::asset::{Encoding, Map, Metadata, Parts};
-use ntmu::isa::embed::Wave;
 use ntmu::isa::latent::LatentFormat;
 use ntmu::isa::layer::{IntegerParameters, Layer, Parameters};
 use ntmu::isa::layout::Layout;
-use ntmu::isa::position::{AddressMode, CornerSnap};
+use ntmu::isa::position::AddressMode;
 use ntmu::isa::profile::Profile;
-use ntmu::isa::pyramid::Pyramid;
 use ntmu::isa::rescale::Multiplier;
 use ntmu::isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 use ntmu::isa::{Asset, Program};
@@ -42,18 +40,15 @@ pub(crate) fn asset() -> Result<Asset, Box<dyn Error>> {
         sampling,
     };
     let shape = Shape {
-        width: 32,
-        height: 16,
         mip_count: 1,
         octaves: 0,
-        wave: Wave::Triangle,
-        padding: 0,
-        input_bits: 8,
-        snap: CornerSnap::Cell,
         address_mode: AddressMode::Clamp,
-        pyramid: Pyramid::SINGLE,
-        grids: [grid(Sampling::Corners), grid(Sampling::Interpolated)],
-        outputs: vec![OutputFormat::Unorm8],
+        ..Shape::whole_chain(
+            32,
+            16,
+            [grid(Sampling::Corners), grid(Sampling::Interpolated)],
+            vec![OutputFormat::Unorm8],
+        )
     };
     // Inputs: four corners of grid 0, one latent of grid 1, the level. Only grid 1 counts.
     let inputs = shape.input_count() as u16;

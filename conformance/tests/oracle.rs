@@ -7,12 +7,9 @@ use ntmu_conformance::{Device, ModelDevice, Oracle};
 use ntmu_isa::Asset;
 use ntmu_isa::activation::Activation;
 use ntmu_isa::asset::{Encoding, Map, Metadata, Parts};
-use ntmu_isa::embed::Wave;
 use ntmu_isa::half::Half;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
-use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{OutputFormat, Shape};
 use ntmu_model::Request;
@@ -56,18 +53,14 @@ fn by_hand() -> Asset {
     let third = layer(2, &[2, 3], &[7], Multiplier::power_of_two(0), 0);
     Asset::new(Parts {
         shape: Shape {
-            width: 16,
-            height: 8,
             mip_count: 2,
             octaves: 1,
-            wave: Wave::Triangle,
-            padding: 0,
-            input_bits: 8,
-            snap: CornerSnap::Cell,
-            address_mode: AddressMode::Wrap,
-            pyramid: Pyramid::SINGLE,
-            grids: [corners(1, 4, 3), interpolated(1, 4, 3)],
-            outputs: vec![OutputFormat::Unorm8],
+            ..Shape::whole_chain(
+                16,
+                8,
+                [corners(1, 4, 3), interpolated(1, 4, 3)],
+                vec![OutputFormat::Unorm8],
+            )
         },
         profile: Profile::NORMATIVE,
         // Values 8 and −4 sixteenths; 0 and 8 sixteenths.

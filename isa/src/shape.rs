@@ -170,6 +170,31 @@ pub struct Shape {
 }
 
 impl Shape {
+    /// The shape of a whole mip chain whose grids have one level and repeat: three octaves of
+    /// triangle waves, no padding, inputs of 8 bits, the first corner at its cell.
+    #[must_use]
+    pub fn whole_chain(
+        width: u32,
+        height: u32,
+        grids: [GridShape; 2],
+        outputs: Vec<OutputFormat>,
+    ) -> Shape {
+        Shape {
+            width,
+            height,
+            mip_count: Shape::max_mip_count(width, height),
+            octaves: 3,
+            wave: Wave::Triangle,
+            padding: 0,
+            input_bits: 8,
+            snap: CornerSnap::Cell,
+            address_mode: AddressMode::Wrap,
+            pyramid: Pyramid::SINGLE,
+            grids,
+            outputs,
+        }
+    }
+
     /// Channels of the texture set.
     #[must_use]
     pub fn channel_count(&self) -> u16 {

@@ -2,10 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layout::{BASE_ALIGNMENT, Inside, Layout, LayoutError, Order, Side, Storage};
-use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 use proptest::prelude::*;
@@ -14,23 +12,18 @@ use std::collections::BTreeSet;
 /// A shape of these texels with two grids of channels, bits and log2 of the scale.
 fn shape(width: u32, height: u32, grids: [(u16, u8, u8); 2]) -> Shape {
     Shape {
-        width,
-        height,
         mip_count: 1,
-        octaves: 3,
-        wave: Wave::Triangle,
-        padding: 0,
-        input_bits: 8,
-        snap: CornerSnap::Cell,
-        address_mode: AddressMode::Wrap,
-        pyramid: Pyramid::SINGLE,
-        grids: grids.map(|(channels, bits, scale_log2)| GridShape {
-            channels,
-            format: LatentFormat::new(bits).unwrap(),
-            scale_log2,
-            sampling: Sampling::Corners,
-        }),
-        outputs: vec![OutputFormat::Unorm8],
+        ..Shape::whole_chain(
+            width,
+            height,
+            grids.map(|(channels, bits, scale_log2)| GridShape {
+                channels,
+                format: LatentFormat::new(bits).unwrap(),
+                scale_log2,
+                sampling: Sampling::Corners,
+            }),
+            vec![OutputFormat::Unorm8],
+        )
     }
 }
 

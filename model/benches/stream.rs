@@ -2,11 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a bench fails by panicking")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
-use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::sampler::{Order, Sampler};
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 use ntmu_model::sampler::Sampled;
@@ -21,20 +18,7 @@ fn shape(size: u32) -> Shape {
         scale_log2: 3,
         sampling: Sampling::Interpolated,
     };
-    Shape {
-        width: size,
-        height: size,
-        mip_count: Shape::max_mip_count(size, size),
-        octaves: 3,
-        wave: Wave::Triangle,
-        padding: 0,
-        input_bits: 8,
-        snap: CornerSnap::Cell,
-        address_mode: AddressMode::Wrap,
-        pyramid: Pyramid::SINGLE,
-        grids: [grid; 2],
-        outputs: vec![OutputFormat::Unorm8; 9],
-    }
+    Shape::whole_chain(size, size, [grid; 2], vec![OutputFormat::Unorm8; 9])
 }
 
 fn count(stream: &Stream<'_>) -> u64 {

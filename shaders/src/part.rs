@@ -127,35 +127,28 @@ mod tests {
     use super::*;
     use ntmu_isa::activation::Activation;
     use ntmu_isa::asset::{Encoding, Map, Metadata, Parts};
-    use ntmu_isa::embed::Wave;
     use ntmu_isa::half::Half;
     use ntmu_isa::latent::LatentFormat;
     use ntmu_isa::layer::{HalfParameters, Parameters};
-    use ntmu_isa::position::{AddressMode, CornerSnap};
     use ntmu_isa::profile::Profile;
-    use ntmu_isa::pyramid::Pyramid;
     use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 
     /// fp16 layers of these widths on one texel.
     fn half_layers(widths: &[u16], sum: SumOrder) -> Asset {
         let shape = Shape {
-            width: 1,
-            height: 1,
             mip_count: 1,
             octaves: 0,
-            wave: Wave::Triangle,
-            padding: 0,
-            input_bits: 8,
-            snap: CornerSnap::Cell,
-            address_mode: AddressMode::Wrap,
-            pyramid: Pyramid::SINGLE,
-            grids: [GridShape {
-                channels: 1,
-                format: LatentFormat::new(1).unwrap(),
-                scale_log2: 3,
-                sampling: Sampling::Interpolated,
-            }; 2],
-            outputs: vec![OutputFormat::Float16],
+            ..Shape::whole_chain(
+                1,
+                1,
+                [GridShape {
+                    channels: 1,
+                    format: LatentFormat::new(1).unwrap(),
+                    scale_log2: 3,
+                    sampling: Sampling::Interpolated,
+                }; 2],
+                vec![OutputFormat::Float16],
+            )
         };
         let mut inputs = shape.input_count() as u16;
         let layers = widths

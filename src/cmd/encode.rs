@@ -90,6 +90,12 @@ pub(crate) struct Encode {
     /// Which levels the grids have: single, ntc or every-mip.
     #[arg(long, value_name = "PYRAMID")]
     pyramid: Option<String>,
+    /// Where the corners of mips coarser than the grids begin: at the cell, or at the stride.
+    #[arg(long, value_name = "SNAP")]
+    snap: Option<String>,
+    /// What lies beyond the edge of a grid: wrap, mirror or clamp.
+    #[arg(long, value_name = "ADDRESS")]
+    address: Option<String>,
     /// Residual blocks instead of the preset's.
     #[arg(long, value_name = "COUNT")]
     blocks: Option<u8>,

@@ -8,11 +8,8 @@ mod refused;
 mod written;
 
 use ntmu::access::{AccessError, TraceFile};
-use ntmu::isa::embed::Wave;
 use ntmu::isa::latent::LatentFormat;
-use ntmu::isa::position::{AddressMode, CornerSnap};
 use ntmu::isa::profile::Profile;
-use ntmu::isa::pyramid::Pyramid;
 use ntmu::isa::sampler::Sampler;
 use ntmu::isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 use ntmu::model::sampler::Sampled;
@@ -28,18 +25,8 @@ pub(crate) fn shape(width: u32, height: u32) -> Shape {
         sampling: Sampling::Interpolated,
     };
     Shape {
-        width,
-        height,
-        mip_count: Shape::max_mip_count(width, height),
         octaves: 1,
-        wave: Wave::Triangle,
-        padding: 0,
-        input_bits: 8,
-        snap: CornerSnap::Cell,
-        address_mode: AddressMode::Wrap,
-        pyramid: Pyramid::SINGLE,
-        grids: [grid; 2],
-        outputs: vec![OutputFormat::Unorm8; 3],
+        ..Shape::whole_chain(width, height, [grid; 2], vec![OutputFormat::Unorm8; 3])
     }
 }
 

@@ -4,6 +4,7 @@ mod budgets;
 mod kill;
 mod loss;
 mod places;
+mod shape;
 mod threads;
 
 use crate::support::command::{ntmu, stderr};

@@ -1,10 +1,7 @@
 //! Spec: what a synthetic asset is to look like.
 
-use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
-use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 
 /// The activation of a synthetic asset's hidden layers.
@@ -88,18 +85,13 @@ impl Spec {
     pub fn small(width: u32, height: u32) -> Spec {
         Spec {
             shape: Shape {
-                width,
-                height,
-                mip_count: Shape::max_mip_count(width, height),
                 octaves: 1,
-                wave: Wave::Triangle,
-                padding: 0,
-                input_bits: 8,
-                snap: CornerSnap::Cell,
-                address_mode: AddressMode::Wrap,
-                pyramid: Pyramid::SINGLE,
-                grids: [corners(2, 4, 3), interpolated(3, 4, 3)],
-                outputs: vec![OutputFormat::Unorm8; 2],
+                ..Shape::whole_chain(
+                    width,
+                    height,
+                    [corners(2, 4, 3), interpolated(3, 4, 3)],
+                    vec![OutputFormat::Unorm8; 2],
+                )
             },
             profile: Profile::NORMATIVE,
             kinds: vec![SpecKind::Integer {

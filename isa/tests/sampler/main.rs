@@ -10,10 +10,7 @@ mod number;
 mod plan;
 mod state;
 
-use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
-use ntmu_isa::position::{AddressMode, CornerSnap};
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 
 /// A chain of `mip_count` mips with these channels; its grids take no part in sampling.
@@ -25,17 +22,8 @@ pub(crate) fn shape(size: [u32; 2], mip_count: u8, outputs: &[OutputFormat]) -> 
         sampling: Sampling::Interpolated,
     };
     Shape {
-        width: size[0],
-        height: size[1],
         mip_count,
         octaves: 1,
-        wave: Wave::Triangle,
-        padding: 0,
-        input_bits: 8,
-        snap: CornerSnap::Cell,
-        address_mode: AddressMode::Wrap,
-        pyramid: Pyramid::SINGLE,
-        grids: [grid; 2],
-        outputs: outputs.to_vec(),
+        ..Shape::whole_chain(size[0], size[1], [grid; 2], outputs.to_vec())
     }
 }

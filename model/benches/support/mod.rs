@@ -3,13 +3,10 @@
 use ntmu_isa::Asset;
 use ntmu_isa::activation::Activation;
 use ntmu_isa::asset::{Encoding, Map, Metadata, Parts};
-use ntmu_isa::embed::Wave;
 use ntmu_isa::half::Half;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Skip};
-use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 
@@ -115,25 +112,17 @@ fn half_parameters(weights: &[i8], outputs: u16, random: &mut Random) -> HalfPar
 pub(crate) fn asset(kind: Kind, size: u32) -> Asset {
     let mut random = Random(0x1234_5678_9abc_def1);
     let four = LatentFormat::new(4).unwrap();
-    let shape = Shape {
-        width: size,
-        height: size,
-        mip_count: Shape::max_mip_count(size, size),
-        octaves: 3,
-        wave: Wave::Triangle,
-        padding: 0,
-        input_bits: 8,
-        snap: CornerSnap::Cell,
-        address_mode: AddressMode::Wrap,
-        pyramid: Pyramid::SINGLE,
-        grids: [0, 1].map(|grid: usize| GridShape {
+    let shape = Shape::whole_chain(
+        size,
+        size,
+        [0, 1].map(|grid: usize| GridShape {
             channels: kind.grids[grid],
             format: four,
             scale_log2: 3,
             sampling: [Sampling::Corners, Sampling::Interpolated][grid],
         }),
-        outputs: vec![OutputFormat::Unorm8; kind.channels],
-    };
+        vec![OutputFormat::Unorm8; kind.channels],
+    );
     let grids = [0, 1].map(|grid| {
         let latents = shape.grid_latents(grid);
         (0..latents).map(|_| random.below(16) as u8).collect()

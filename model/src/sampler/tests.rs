@@ -1,8 +1,5 @@
 use super::*;
-use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
-use ntmu_isa::position::{AddressMode, CornerSnap};
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::sampler::{Address, Detail, Filter, Footprint, MipBlend, MipFilter, Order};
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling};
 use std::cell::RefCell;
@@ -29,18 +26,9 @@ impl Marked {
             sampling: Sampling::Interpolated,
         };
         let shape = Shape {
-            width,
-            height,
             mip_count,
             octaves: 1,
-            wave: Wave::Triangle,
-            padding: 0,
-            input_bits: 8,
-            snap: CornerSnap::Cell,
-            address_mode: AddressMode::Wrap,
-            pyramid: Pyramid::SINGLE,
-            grids: [grid; 2],
-            outputs: vec![OutputFormat::Unorm16; 3],
+            ..Shape::whole_chain(width, height, [grid; 2], vec![OutputFormat::Unorm16; 3])
         };
         Marked {
             shape,

@@ -8,14 +8,11 @@ use crate::request::Request;
 use crate::trace::{Addresses, Fetch};
 use ntmu_isa::activation::{Activation, TABLE_ENTRIES};
 use ntmu_isa::asset::{Encoding, Map, Metadata, Parts};
-use ntmu_isa::embed::Wave;
 use ntmu_isa::half::Half;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
 use ntmu_isa::layout::Layout;
-use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::rescale::Multiplier;
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
 use ntmu_isa::{Asset, Program};
@@ -110,21 +107,17 @@ pub(super) fn asset(sketch: &Sketch) -> Asset {
     };
     let [first, second] = sketch.grid_channels;
     let shape = Shape {
-        width: sketch.size,
-        height: sketch.size,
         mip_count: sketch.mip_count,
         octaves: sketch.octaves,
-        wave: Wave::Triangle,
-        padding: 0,
-        input_bits: 8,
-        snap: CornerSnap::Cell,
-        address_mode: AddressMode::Wrap,
-        pyramid: Pyramid::SINGLE,
-        grids: [
-            grid(first, Sampling::Corners),
-            grid(second, Sampling::Interpolated),
-        ],
-        outputs: vec![OutputFormat::Unorm8; usize::from(sketch.channels)],
+        ..Shape::whole_chain(
+            sketch.size,
+            sketch.size,
+            [
+                grid(first, Sampling::Corners),
+                grid(second, Sampling::Interpolated),
+            ],
+            vec![OutputFormat::Unorm8; usize::from(sketch.channels)],
+        )
     };
     let last = Hidden {
         kind: sketch.last,

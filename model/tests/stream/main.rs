@@ -7,11 +7,8 @@ mod scans;
 mod scenes;
 mod specs;
 
-use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
-use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::sampler::footprint::{Footprint, GRADIENT_BITS};
 use ntmu_isa::sampler::{Address, Detail, Filter, MipFilter, Order, SampleRequest, Sampler};
 use ntmu_isa::shape::{GridShape, OutputFormat, Sampling, Shape};
@@ -31,18 +28,8 @@ pub(crate) fn shape(width: u32, height: u32) -> Shape {
         sampling: Sampling::Interpolated,
     };
     Shape {
-        width,
-        height,
-        mip_count: Shape::max_mip_count(width, height),
         octaves: 1,
-        wave: Wave::Triangle,
-        padding: 0,
-        input_bits: 8,
-        snap: CornerSnap::Cell,
-        address_mode: AddressMode::Wrap,
-        pyramid: Pyramid::SINGLE,
-        grids: [grid; 2],
-        outputs: vec![OutputFormat::Unorm8; 3],
+        ..Shape::whole_chain(width, height, [grid; 2], vec![OutputFormat::Unorm8; 3])
     }
 }
 

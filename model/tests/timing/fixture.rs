@@ -2,12 +2,10 @@
 
 use ntmu_isa::activation::{Activation, TABLE_ENTRIES};
 use ntmu_isa::asset::{Encoding, Map, Metadata, Parts};
-use ntmu_isa::embed::Wave;
 use ntmu_isa::half::Half;
 use ntmu_isa::latent::LatentFormat;
 use ntmu_isa::layer::{HalfParameters, IntegerParameters, Layer, Parameters, Quantize, Skip};
 use ntmu_isa::layout::Layout;
-use ntmu_isa::position::{AddressMode, CornerSnap};
 use ntmu_isa::profile::Profile;
 use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::rescale::Multiplier;
@@ -93,21 +91,16 @@ pub(crate) fn shape(size: u32, grid_channels: [u16; 2], octaves: u8, channels: u
     };
     let [first, second] = grid_channels;
     Shape {
-        width: size,
-        height: size,
-        mip_count: Shape::max_mip_count(size, size),
         octaves,
-        wave: Wave::Triangle,
-        padding: 0,
-        input_bits: 8,
-        snap: CornerSnap::Cell,
-        address_mode: AddressMode::Wrap,
-        pyramid: Pyramid::SINGLE,
-        grids: [
-            grid(first, Sampling::Corners),
-            grid(second, Sampling::Interpolated),
-        ],
-        outputs: vec![OutputFormat::Unorm8; usize::from(channels)],
+        ..Shape::whole_chain(
+            size,
+            size,
+            [
+                grid(first, Sampling::Corners),
+                grid(second, Sampling::Interpolated),
+            ],
+            vec![OutputFormat::Unorm8; usize::from(channels)],
+        )
     }
 }
 

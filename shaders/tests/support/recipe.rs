@@ -54,23 +54,15 @@ pub(crate) fn shape(
         sampling,
     };
     let [first, second] = grids;
-    Shape {
+    Shape::whole_chain(
         width,
         height,
-        mip_count: Shape::max_mip_count(width, height),
-        octaves: 3,
-        wave: Wave::Triangle,
-        padding: 0,
-        input_bits: 8,
-        snap: CornerSnap::Cell,
-        address_mode: AddressMode::Wrap,
-        pyramid: Pyramid::SINGLE,
-        grids: [
+        [
             grid(first, Sampling::Corners),
             grid(second, Sampling::Interpolated),
         ],
         outputs,
-    }
+    )
 }
 
 /// Any profile, with the accumulators as often narrow as not.

@@ -2,6 +2,7 @@
 
 use super::{Encode, smaller};
 use anyhow::Context as _;
+use ntmu::isa::position::{AddressMode, CornerSnap};
 use ntmu::trainer::{
     EFFORTS, PYRAMIDS, Plan, Precision, Preset, Source, TrainConfig, TrainingDevice,
 };
@@ -71,11 +72,17 @@ impl Encode {
             config.hidden.clone_from(hidden);
         }
         if let Some(name) = &self.pyramid {
-            let found = PYRAMIDS.iter().find(|(known, _)| known == name);
-            config.pyramid = found.map(|(_, pyramid)| *pyramid).with_context(|| {
-                let names = PYRAMIDS.map(|(name, _)| name).join(", ");
-                format!("pyramid: found {name:?}; allowed: {names}")
-            })?;
+            config.pyramid = named("pyramid", name, PYRAMIDS)?;
+        }
+        if let Some(name) = &self.snap {
+            config.snap = named("snap", name, CornerSnap::ALL.map(|s| (s.name(), s.into())))?;
+        }
+        if let Some(name) = &self.address {
+            config.address = named(
+                "address",
+                name,
+                AddressMode::ALL.map(|a| (a.name(), a.into())),
+            )?;
         }
         if let Some(blocks) = self.blocks {
             config.residual_blocks = blocks;
@@ -96,11 +103,7 @@ impl Encode {
         }
         if let Some(name) = &self.precision {
             let known = [Precision::Int8, Precision::Fp16];
-            let found = known.into_iter().find(|precision| precision.name() == name);
-            config.precision = found.with_context(|| {
-                let names = known.map(Precision::name).join(", ");
-                format!("precision: found {name:?}; allowed: {names}")
-            })?;
+            config.precision = named("precision", name, known.map(|p| (p.name(), p)))?;
         }
         if let Some(bits) = self.activation_bits {
             config.activation_bits = bits;
@@ -115,6 +118,19 @@ impl Encode {
         }
         Ok(())
     }
+}
+
+/// The choice with this name.
+fn named<T: Copy, const N: usize>(
+    field: &str,
+    name: &str,
+    choices: [(&str, T); N],
+) -> anyhow::Result<T> {
+    let found = choices.iter().find(|(known, _)| *known == name);
+    found.map(|(_, choice)| *choice).with_context(|| {
+        let names = choices.map(|(known, _)| known).join(", ");
+        format!("{field}: found {name:?}; allowed: {names}")
+    })
 }
 
 /// A plan by name, or the one in a file.

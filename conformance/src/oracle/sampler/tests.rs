@@ -1,8 +1,5 @@
 use super::*;
-use ntmu_isa::embed::Wave;
 use ntmu_isa::latent::LatentFormat;
-use ntmu_isa::position::{AddressMode, CornerSnap};
-use ntmu_isa::pyramid::Pyramid;
 use ntmu_isa::sampler::{Detail, Footprint, SampleRequest};
 use ntmu_isa::shape::{GridShape, Sampling};
 use ntmu_model::sampler::{Decode, Probes, Texture};
@@ -25,18 +22,9 @@ impl Noise {
             sampling: Sampling::Interpolated,
         };
         let shape = Shape {
-            width: size[0],
-            height: size[1],
             mip_count,
             octaves: 1,
-            wave: Wave::Triangle,
-            padding: 0,
-            input_bits: 8,
-            snap: CornerSnap::Cell,
-            address_mode: AddressMode::Wrap,
-            pyramid: Pyramid::SINGLE,
-            grids: [grid; 2],
-            outputs: OutputFormat::ALL.to_vec(),
+            ..Shape::whole_chain(size[0], size[1], [grid; 2], OutputFormat::ALL.to_vec())
         };
         Noise { shape, profile }
     }
