@@ -31,7 +31,7 @@ pub fn bd_rate(anchor: &Points, test: &Points, method: Method) -> Result<Delta, 
             .map(|(rate, metric)| (*metric, rate.log10()))
             .collect()
     };
-    let delta = mean_distance("metric", (anchor, swap(anchor)), (test, swap(test)), method)?;
+    let delta = mean_distance(METRIC, (anchor, swap(anchor)), (test, swap(test)), method)?;
     Ok(Delta {
         value: 100.0 * (10_f64.powf(delta.value) - 1.0),
         ..delta
@@ -50,18 +50,19 @@ pub fn bd_psnr(anchor: &Points, test: &Points, method: Method) -> Result<Delta, 
             .map(|(rate, metric)| (rate.log10(), *metric))
             .collect()
     };
-    mean_distance(
-        "log10 rate",
-        (anchor, logs(anchor)),
-        (test, logs(test)),
-        method,
-    )
+    mean_distance(RATE, (anchor, logs(anchor)), (test, logs(test)), method)
 }
+
+/// What the mean is over: its name, and what a knot's place on it means to a reader.
+type Along = (&'static str, fn(f64) -> f64);
+
+const METRIC: Along = ("metric", |metric| metric);
+const RATE: Along = ("rate", |log10| 10_f64.powf(log10));
 
 type Knots<'a> = (&'a Points, Vec<(f64, f64)>);
 
 fn mean_distance(
-    along: &'static str,
+    (along, shown): Along,
     anchor: Knots<'_>,
     test: Knots<'_>,
     method: Method,
@@ -78,8 +79,8 @@ fn mean_distance(
             anchor: anchor.0.name().to_owned(),
             test: test.0.name().to_owned(),
             along,
-            anchor_range: a,
-            test_range: t,
+            anchor_range: a.map(shown),
+            test_range: t.map(shown),
         });
     }
     let integral = |knots| Interpolant::new(knots, method).integral(overlap[0], overlap[1]);
@@ -225,7 +226,7 @@ mod tests {
         let above = points(&[(1.0, 35.0), (2.0, 36.0)]);
         let text = message(&good, &above, Method::Pchip);
         assert!(
-            text.contains("metric from 30 to 35 and from 35 to 36"),
+            text.contains("metric from 30.0000 to 35.0000 and from 35.0000 to 36.0000"),
             "{text}"
         );
         assert!(bd_psnr(&good, &above, Method::Pchip).is_ok());

@@ -97,15 +97,16 @@ pub enum CurveError {
     },
     /// Two curves have no interval in common.
     #[error(
-        "curves {anchor:?} and {test:?}: found {along} from {} to {} and from {} to {}; allowed: \
-         intervals that overlap", .anchor_range[0], .anchor_range[1], .test_range[0], .test_range[1]
+        "curves {anchor:?} and {test:?}: found {along} from {:.4} to {:.4} and from {:.4} to {:.4}; \
+         allowed: intervals that overlap",
+        .anchor_range[0], .anchor_range[1], .test_range[0], .test_range[1]
     )]
     NoOverlap {
         /// The anchor's name.
         anchor: String,
         /// The test curve's name.
         test: String,
-        /// Along which axis: `metric` or `log10 rate`.
+        /// Along which axis: `metric` or `rate`.
         along: &'static str,
         /// The anchor's interval.
         anchor_range: [f64; 2],

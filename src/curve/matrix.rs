@@ -94,10 +94,11 @@ impl Matrix {
                 self.heads()
             );
             text += &format!("|---|{}\n", "---:|".repeat(self.names.len()));
-            for (name, row) in self.names.iter().zip(cells) {
+            for (anchor, (name, row)) in self.names.iter().zip(cells).enumerate() {
                 let cells: Vec<String> = row.iter().map(|cell| shown(cell, unit, digits)).collect();
                 text += &format!("| {} | {} |\n", super::table::cell(name), cells.join(" | "));
-                for cell in row {
+                // The pair the other way round has none for the same reason.
+                for cell in &row[anchor..] {
                     if let Cell::None { reason } = cell
                         && !reasons.contains(reason)
                     {
@@ -169,5 +170,23 @@ mod tests {
             text.contains("found 1 points; allowed with pchip: at least 2"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn a_pair_without_overlap_is_explained_once_for_each_axis() {
+        let points = |name: &str, rate: f64, metric: f64| {
+            Points::new(name, vec![(rate, metric), (2.0 * rate, metric + 1.0)]).unwrap()
+        };
+        let curves = [points("a", 0.5, 30.0), points("b", 4.0, 40.0)];
+        let text = matrix(&curves, Method::Pchip).markdown();
+        let reasons: Vec<&str> = text.lines().filter(|l| l.starts_with("- ")).collect();
+        let of = |along: &str| {
+            format!("- curves \"a\" and \"b\": found {along}; allowed: intervals that overlap")
+        };
+        let expected = [
+            of("metric from 30.0000 to 31.0000 and from 40.0000 to 41.0000"),
+            of("rate from 0.5000 to 1.0000 and from 4.0000 to 8.0000"),
+        ];
+        assert_eq!(reasons, expected);
     }
 }
