@@ -11,7 +11,7 @@ const MAY_USE: [(&str, &[&str]); 5] = [
     ("isa", &[]),
     ("model", &["ntmu-isa"]),
     ("shaders", &["ntmu-isa"]),
-    ("trainer", &["ntmu-isa"]),
+    ("trainer", &["ntmu-isa", "ntmu-model"]),
     ("conformance", &["ntmu-isa", "ntmu-model"]),
 ];
 

@@ -2,6 +2,8 @@
 
 mod amounts;
 
+pub(crate) use amounts::weight;
+
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -33,6 +35,10 @@ pub(crate) struct Encode {
     /// run.
     #[arg(long, value_name = "STEPS", conflicts_with = "time")]
     steps: Option<String>,
+    /// Rounds in which latents settle when training is over; as many as suit the effort or the time
+    /// by default, none after a plan.
+    #[arg(long, value_name = "ROUNDS")]
+    settle: Option<u32>,
     /// Train the latents directly in the plan's encoder stages, for as many steps.
     #[arg(long)]
     no_encoder: bool,

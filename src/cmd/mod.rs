@@ -17,6 +17,7 @@ mod microprogram;
 mod profile;
 mod program;
 mod sample;
+mod settle;
 mod simulate;
 mod study;
 mod texel;
@@ -72,6 +73,8 @@ enum Verb {
     Analyse(analyse::Analyse),
     /// Write an asset in other numbers: fewer bits, fp16, another profile.
     Convert(convert::Convert),
+    /// Let the latents of an asset settle on its source: codes move where it then decodes better.
+    Settle(settle::Settle),
     /// List the profiles, or print one: the choices that implementations make differently.
     Profile(profile::Profile),
     /// List the units, or print one: hardware configurations with the reason for every number.
@@ -105,6 +108,7 @@ impl Arguments {
             Verb::Analyse(verb) => verb.run(json),
             Verb::Conform(verb) => verb.run(json),
             Verb::Convert(verb) => verb.run(json),
+            Verb::Settle(verb) => verb.run(json),
             Verb::Profile(verb) => verb.run(json),
             Verb::Unit(verb) => verb.run(json),
             Verb::Throughput(verb) => verb.run(json),

@@ -11,9 +11,10 @@ fn a_run_that_a_time_fixed_is_repeated_by_its_recorded_steps() {
     let folder = folder.path();
     done(folder, &encode("timed.ntx", &["--time", "2s"]));
     let timed = read(folder, "timed.ntx");
-    let steps = recorded(&timed, "steps").unwrap();
-    done(folder, &encode("again.ntx", &["--steps", &steps]));
-    assert!(read(folder, "again.ntx") == timed, "{steps}");
+    let [steps, rounds] = ["steps", "settle"].map(|key| recorded(&timed, key).unwrap());
+    let again = ["--steps", &steps, "--settle", &rounds];
+    done(folder, &encode("again.ntx", &again));
+    assert!(read(folder, "again.ntx") == timed, "{steps} {rounds}");
 }
 
 #[test]

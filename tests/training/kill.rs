@@ -33,7 +33,7 @@ fn spawn(folder: &Path, arguments: &[&str]) -> Child {
 fn a_run_killed_at_random_points_and_resumed_ends_with_the_bytes_of_an_uninterrupted_run() {
     let folder = folder();
     let folder = folder.path();
-    let plan = ["--plan", "plan.toml"];
+    let plan = ["--plan", "plan.toml", "--settle", "2"];
     let (code, said) = run(
         folder,
         &encode(
@@ -42,9 +42,10 @@ fn a_run_killed_at_random_points_and_resumed_ends_with_the_bytes_of_an_uninterru
         ),
     );
     assert_eq!(code, Some(0), "{said}");
-    let total = lines(folder, "whole.jsonl").last().unwrap()["total"]
-        .as_u64()
-        .unwrap();
+    let said = lines(folder, "whole.jsonl");
+    let settled = said.iter().filter(|line| line["stage"] == "settling");
+    assert_eq!(settled.count(), 2);
+    let total = said[0]["total"].as_u64().unwrap();
 
     let mut arguments = encode(
         "killed.ntx",

@@ -4,6 +4,7 @@ mod budgets;
 mod kill;
 mod loss;
 mod places;
+mod settle;
 mod shape;
 mod threads;
 

@@ -8,8 +8,10 @@ use crate::device::TrainingDevice;
 use crate::error::TrainError;
 use crate::model::{Ground, Model};
 use crate::plan::Train;
+use crate::run::asset_of;
 use crate::sampler::Numbers;
 use crate::schedule;
+use crate::settle::Settling;
 use crate::stage::Stage;
 use crate::stepper::Stepper;
 use std::time::Instant;
@@ -30,6 +32,13 @@ const WARM_UP: u64 = 2;
 /// The most steps between two looks at the clock on a device, which has to finish them for that.
 const AT_ONCE: u64 = 16;
 
+/// The share of the time in which latents settle.
+const SETTLING: f64 = 0.1;
+
+/// Decodes of the whole set that a round of settling costs: eight, each with the comparison of all
+/// errors.
+const DECODES: f64 = 12.0;
+
 /// What is kept back for what was not foreseen.
 const KEPT: f64 = 0.02;
 
@@ -40,8 +49,10 @@ pub(crate) struct Budget {
     seconds: f64,
     /// Seconds of a step of each stage, as measured before the first.
     costs: Vec<f64>,
-    /// Seconds that looking at the whole set takes when the run is over.
+    /// Seconds that settling, and looking at the whole set, take when the steps are over.
     ending: f64,
+    /// Rounds in which latents settle.
+    pub(crate) rounds: u32,
 }
 
 impl Budget {
@@ -66,6 +77,7 @@ impl Budget {
             seconds,
             costs: Vec::new(),
             ending,
+            rounds: ground.config.settle.unwrap_or(0),
         };
         let mut factor = budget.measure(ground, &mut scratch, stages, device, started)?;
         if schedule::follows_effort(ground.config) {
@@ -80,8 +92,32 @@ impl Budget {
                 factor = budget.measure(ground, &mut scratch, stages, device, started)?;
             }
         }
+        let settling = budget.fit_rounds(ground, &mut scratch)?;
+        budget.ending += settling;
+        factor -= settling / budget.cost(stages, 0);
         budget.scale(stages, 0, factor);
         Ok(budget)
+    }
+
+    /// Fixes the rounds in which latents settle, where the configuration does not; the seconds that
+    /// they will take.
+    fn fit_rounds(&mut self, ground: &Ground<'_>, scratch: &mut Model) -> Result<f64, TrainError> {
+        let config = ground.config;
+        if config.settle.is_none() && !schedule::follows_effort(config) {
+            return Ok(0.0);
+        }
+        if scratch.ranges.is_empty() {
+            scratch.deploy(ground);
+        }
+        let asset = asset_of(scratch, ground, Vec::new())?;
+        let clock = Instant::now();
+        Settling::new(asset, &ground.texels, &ground.positions)?;
+        let decode = clock.elapsed().as_secs_f64();
+        // The way back takes twice the way forward, of which the ending has two.
+        let round = DECODES * decode + 1.5 * self.ending;
+        let fitting = (SETTLING * self.seconds / round) as u32;
+        self.rounds = config.settle.unwrap_or(fitting.min(schedule::MOST_ROUNDS));
+        Ok(f64::from(self.rounds) * round)
     }
 
     /// Measures a step of every stage; the factor by which the steps then fit the time left.
@@ -207,6 +243,7 @@ mod tests {
             seconds: 100.0,
             costs: vec![0.0, 0.01, 0.02],
             ending: 3.0,
+            rounds: 0,
         };
         // 60 s expected and 30 after it. Twice as slow, 30 would take 60 where only 95 − 65 are
         // left.

@@ -162,6 +162,7 @@ impl TrainConfig {
         }
         let week = 7.0 * 24.0 * 3600.0;
         range("seconds", self.seconds.unwrap_or(1.0), 1.0, week)?;
+        range("settle", self.settle.unwrap_or(0), 0, 100)?;
         range("target_psnr", self.target_psnr.unwrap_or(0.0), 0.0, 200.0)?;
         self.plan.as_ref().map_or(Ok(()), Plan::check)
     }

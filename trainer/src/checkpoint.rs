@@ -1,9 +1,9 @@
 //! Checkpoint: the state between two steps, as a file.
 //!
 //! ```text
-//! "NTMUCKP3"  identity u64  stage u32  step u64
+//! "NTMUCKP4"  identity u64  stage u32  step u64
 //! loss f64  least f64  seconds f64
-//! stages u32  then for each: steps u64  batch u64
+//! rounds u32  stages u32  then for each: steps u64  batch u64
 //! count u32   then for each array: length u64, that many f32
 //! CRC-32 of everything before it
 //! ```
@@ -18,7 +18,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-const MAGIC: &[u8; 8] = b"NTMUCKP3";
+const MAGIC: &[u8; 8] = b"NTMUCKP4";
 
 /// Where a run is, between two steps.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +32,8 @@ pub(crate) struct Position {
     pub(crate) least: f64,
     /// Seconds that the run has taken so far.
     pub(crate) seconds: f64,
+    /// Rounds in which latents settle after the last stage.
+    pub(crate) rounds: u32,
     /// What a budget of time has fixed of each stage that runs.
     pub(crate) extents: Vec<Extent>,
 }
@@ -186,6 +188,7 @@ fn put(path: &Path, identity: u64, position: &Position, model: &Model) -> std::i
     for value in [loss, least, seconds] {
         file.put(&value.to_le_bytes())?;
     }
+    file.put(&position.rounds.to_le_bytes())?;
     file.put(&(position.extents.len() as u32).to_le_bytes())?;
     for extent in &position.extents {
         file.put(&extent.steps.to_le_bytes())?;
@@ -298,6 +301,7 @@ pub(crate) fn read(
     let stage = reader.u32()? as usize;
     let step = reader.u64()?;
     let [loss, least, seconds] = [reader.f64()?, reader.f64()?, reader.f64()?];
+    let rounds = reader.u32()?;
     let found = reader.u32()? as usize;
     if found != stages.len() {
         return Err(reader.refuse(format!("{found} stages"), stages.len().to_string()));
@@ -351,6 +355,7 @@ pub(crate) fn read(
         loss,
         least,
         seconds,
+        rounds,
         extents,
     })
 }

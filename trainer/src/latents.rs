@@ -100,6 +100,13 @@ impl Latents {
             .collect()
     }
 
+    /// Replaces the values by those of stored codes.
+    pub(crate) fn take(&mut self, codes: &[u8]) {
+        for (value, &code) in self.values.iter_mut().zip(codes) {
+            *value = self.format.value(code) as f32;
+        }
+    }
+
     /// A small start around zero.
     pub(crate) fn scatter_start(&mut self, stream: Stream, first: u64) {
         let (low, high) = self.limits();

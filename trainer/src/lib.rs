@@ -17,6 +17,7 @@
 //! | `export` | the asset |
 //! | `latents`, `adam`, `batch`, `engine`, `refine` | a step on the whole set |
 //! | [`TrainingDevice`], `graph`, `stepper` | the steps in reals on a GPU, through burn |
+//! | [`settle`], `import` | codes that move when training is over |
 //! | [`Plan`], [`Stage`], `schedule` | what is trained, in which order, how fast |
 //! | `train`, `run`, `budget`, `checkpoint`, `record`, `report` | the run |
 
@@ -46,6 +47,7 @@ mod export;
 mod first_latents;
 mod graph;
 mod half;
+mod import;
 mod integer;
 mod kernel;
 mod latents;
@@ -63,6 +65,7 @@ mod report;
 mod run;
 mod sampler;
 mod schedule;
+mod settle;
 mod size;
 mod source;
 mod stage;
@@ -84,6 +87,7 @@ pub use plan::{Arithmetic, Fall, Mips, Plan, RatesPlan, Shown, StagePlan, Train}
 pub use preset::Preset;
 pub use report::{Progress, StageReport, TrainReport, Trained, Watch};
 pub use schedule::EFFORTS;
+pub use settle::{Round, settle};
 pub use size::asset_bytes;
 pub use source::Source;
 pub use stage::{Rates, Stage};

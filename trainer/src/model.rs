@@ -32,7 +32,7 @@ impl<'a> Ground<'a> {
         config: &'a TrainConfig,
         source: &'a Source,
     ) -> Result<Ground<'a>, TrainError> {
-        let texels = Texels::new(source, config)?;
+        let texels = Texels::new(source, &config.weights)?;
         Ok(Ground {
             config,
             source,

@@ -89,6 +89,7 @@ impl Preset {
             plan: None,
             seconds: None,
             target_psnr: None,
+            settle: None,
             seed: 0,
             checkpoint_every: 2000,
         }

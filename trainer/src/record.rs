@@ -22,6 +22,7 @@ pub(crate) fn steps(config: &TrainConfig, stages: &[Stage]) -> Vec<u64> {
 pub(crate) fn of(
     config: &TrainConfig,
     stages: &[Stage],
+    rounds: u32,
     device: &TrainingDevice,
     psnrs: [f64; 2],
 ) -> Vec<(String, String)> {
@@ -50,6 +51,7 @@ pub(crate) fn of(
         schedule,
         ("steps", steps.join("+")),
         ("batch", batches.join("+")),
+        ("settle", rounds.to_string()),
         ("seed", config.seed.to_string()),
         ("psnr_float", format!("{:.3}", psnrs[0])),
         ("psnr_quantised", format!("{:.3}", psnrs[1])),

@@ -2,6 +2,7 @@
 
 use crate::config::TrainConfig;
 use crate::device::Backend;
+use crate::settle::Round;
 use crate::stage::{Rates, Stage};
 use ntmu_isa::Asset;
 use serde::{Deserialize, Serialize};
@@ -39,6 +40,9 @@ pub trait Watch {
     /// Hears of every twentieth step, of the last of each stage, and of those at which the asset's
     /// quality was measured.
     fn observe(&mut self, progress: &Progress);
+
+    /// Hears of every round in which latents settled, after the last stage.
+    fn settled(&mut self, _round: &Round) {}
 
     /// Whether [`Watch::asset`] should be called now. Nothing that the run makes depends on it.
     fn wants_asset(&mut self) -> bool {
@@ -88,6 +92,8 @@ pub struct TrainReport {
     pub macs: u64,
     /// Steps of each stage of the plan, 0 for one that the set is too small for.
     pub steps: Vec<u64>,
+    /// The rounds in which latents settled afterwards; their decibels count maps as the loss does.
+    pub settled: Vec<Round>,
     /// Whether the asset reached [`TrainConfig::target_psnr`].
     pub reached: Option<bool>,
     /// The seed.

@@ -11,6 +11,7 @@ use crate::plan::Train;
 use crate::record;
 use crate::report::{Progress, StageReport, TrainReport, Trained, Watch};
 use crate::sampler::Numbers;
+use crate::settle::{self, Round, Settling};
 use crate::stage::Stage;
 use crate::stepper::Stepper;
 use ntmu_isa::Asset;
@@ -373,7 +374,43 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    pub(crate) fn finish(mut self) -> Result<Trained, TrainError> {
+    /// Lets the latents settle, unless the asset was wanted as soon as it reached its target.
+    fn settle(
+        &mut self,
+        stop: &AtomicBool,
+        watch: &mut dyn Watch,
+    ) -> Result<Vec<Round>, TrainError> {
+        if self.reached || self.position.rounds == 0 {
+            return Ok(Vec::new());
+        }
+        let Ground {
+            texels, positions, ..
+        } = &self.ground;
+        let asset = asset_of(&self.model, &self.ground, Vec::new())?;
+        let mut settling = Settling::new(asset, texels, positions)?;
+        let rounds = settling.rounds(self.position.rounds, stop, &mut |r| watch.settled(r));
+        if let (Err(TrainError::Stopped { step, .. }), Some(path)) = (&rounds, self.checkpoint) {
+            let step = *step;
+            self.save(path)?;
+            return Err(TrainError::Stopped {
+                stage: settle::STAGE,
+                step,
+                checkpoint: Some(path.to_owned()),
+            });
+        }
+        let grids = &settling.asset.grids;
+        for (latents, codes) in self.model.latents.iter_mut().zip(grids) {
+            latents.take(codes);
+        }
+        rounds
+    }
+
+    pub(crate) fn finish(
+        mut self,
+        stop: &AtomicBool,
+        watch: &mut dyn Watch,
+    ) -> Result<Trained, TrainError> {
+        let settled = self.settle(stop, watch)?;
         let psnr_float = decibels(self.model.evaluate(&self.ground, Numbers::Real).overall());
         let errors = self.model.evaluate(&self.ground, Numbers::Integer);
         let seconds = self.seconds();
@@ -383,11 +420,12 @@ impl<'a> Run<'a> {
             stages,
             device,
             reports,
+            position,
             ..
         } = self;
         let psnr_quantised = decibels(errors.overall());
         let psnrs = [psnr_float, psnr_quantised];
-        let record = record::of(ground.config, &stages, device, psnrs);
+        let record = record::of(ground.config, &stages, position.rounds, device, psnrs);
         let asset = asset_of(&model, &ground, record)?;
         let (width, height) = ground.texels.sizes[0];
         let texels = f64::from(width) * f64::from(height);
@@ -404,6 +442,7 @@ impl<'a> Run<'a> {
             bits_per_texel_channel: bits / (texels * ground.texels.channels as f64),
             macs: ground.topology.macs(),
             steps: record::steps(ground.config, &stages),
+            settled,
             reached: ground
                 .config
                 .target_psnr
@@ -419,7 +458,8 @@ impl<'a> Run<'a> {
     }
 }
 
-fn asset_of(
+/// The asset that a model stands for.
+pub(crate) fn asset_of(
     model: &Model,
     ground: &Ground<'_>,
     record: Vec<(String, String)>,

@@ -2,6 +2,7 @@
 
 use crate::config::{CHUNKS, TILE, TrainConfig};
 use crate::plan::{Arithmetic, Fall, Mips, Plan, RatesPlan, Shown, StagePlan, Train};
+use crate::stage::Stage;
 
 /// Passes over all texels of all mips in the refinement and the integer stage together, at
 /// efforts 0, 10, 50 and 100; between them the logarithm is interpolated.
@@ -98,6 +99,27 @@ const LONG_FALL: f64 = 4000.0;
 /// How many times their learning rate latents take in a fall of so many steps.
 pub(crate) fn haste(steps: f64) -> f64 {
     (LONG_FALL / steps.max(1.0)).sqrt().max(1.0)
+}
+
+/// Passes over the texels for which latents settle once: a round costs about as much as one and a
+/// half, so that it takes a tenth of the time.
+const PASSES_PER_ROUND: f64 = 15.0;
+
+/// Rounds beyond which hardly a latent moves.
+pub(crate) const MOST_ROUNDS: u32 = 8;
+
+/// Rounds in which latents settle after these stages on a set of so many texels.
+pub(crate) fn rounds(config: &TrainConfig, stages: &[Stage], texels: u64) -> u32 {
+    if let Some(rounds) = config.settle {
+        return rounds;
+    }
+    if !follows_effort(config) {
+        return 0;
+    }
+    let drawn = stages.iter().filter(|stage| stage.train == Train::Latents);
+    let drawn: f64 = drawn.map(|s| s.steps as f64 * s.batch as f64).sum();
+    let rounds = (drawn / texels as f64 / PASSES_PER_ROUND).round() as u32;
+    rounds.clamp(1, MOST_ROUNDS)
 }
 
 /// Whether the plan is that of an effort, with whatever steps.

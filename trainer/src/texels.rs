@@ -1,10 +1,10 @@
 //! Texels: the set as a step reads it, with what each texel and channel counts.
 
-use crate::config::TrainConfig;
 use crate::error::TrainError;
 use crate::source::Source;
 use ndarray::Array2;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// The texels of every mip, channels of a texel together.
 ///
@@ -32,7 +32,11 @@ struct Coverage {
 }
 
 impl Texels {
-    pub(crate) fn new(source: &Source, config: &TrainConfig) -> Result<Texels, TrainError> {
+    /// The texels of a set whose maps count as `named` says, those without a name once.
+    pub(crate) fn new(
+        source: &Source,
+        named: &BTreeMap<String, f64>,
+    ) -> Result<Texels, TrainError> {
         let channels = source.outputs.len();
         let mips = source.mips.iter().map(|mip| {
             let (_, height, width) = mip.dim();
@@ -58,7 +62,7 @@ impl Texels {
             channels,
             sizes,
             mips,
-            weights: weights(source, config)?,
+            weights: weights(source, named)?,
             covered,
         })
     }
@@ -169,9 +173,9 @@ impl Texels {
 }
 
 /// The weight of each channel in the loss; their mean is 1.
-fn weights(source: &Source, config: &TrainConfig) -> Result<Vec<f32>, TrainError> {
+fn weights(source: &Source, named: &BTreeMap<String, f64>) -> Result<Vec<f32>, TrainError> {
     let mut weights = vec![1.0; source.outputs.len()];
-    for (map, &weight) in &config.weights {
+    for (map, &weight) in named {
         for channel in source.channels_of(map)? {
             weights[channel] = weight;
         }
@@ -217,7 +221,6 @@ fn coverage(mask: &Array2<bool>, sizes: &[(u32, u32)]) -> Vec<Coverage> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::preset::Preset;
     use ndarray::Array3;
     use ntmu_isa::shape::OutputFormat;
 
@@ -232,7 +235,7 @@ mod tests {
     }
 
     fn texels(source: &Source) -> Texels {
-        Texels::new(source, &Preset::ALL[0].config()).unwrap()
+        Texels::new(source, &BTreeMap::new()).unwrap()
     }
 
     #[test]

@@ -51,11 +51,7 @@ pub(crate) struct Topology {
 
 impl Topology {
     pub(crate) fn new(config: &TrainConfig, channels: usize) -> Topology {
-        let mut topology = Topology {
-            layers: Vec::new(),
-            activation: config.activation,
-            parameters: 0,
-        };
+        let mut topology = Topology::empty(config.activation);
         let mut width = config.input_count();
         for &hidden in &config.hidden {
             topology.push(width, usize::from(hidden), true, None);
@@ -85,7 +81,23 @@ impl Topology {
         halves(layer) && halves(layer + 1)
     }
 
-    fn push(&mut self, inputs: usize, outputs: usize, activated: bool, skip: Option<usize>) {
+    /// No layer yet.
+    pub(crate) const fn empty(activation: ActivationKind) -> Topology {
+        Topology {
+            layers: Vec::new(),
+            activation,
+            parameters: 0,
+        }
+    }
+
+    /// One more layer, of integers.
+    pub(crate) fn push(
+        &mut self,
+        inputs: usize,
+        outputs: usize,
+        activated: bool,
+        skip: Option<usize>,
+    ) {
         let weights_at = self.parameters;
         let bias_at = weights_at + padded(inputs) * padded(outputs);
         self.parameters = bias_at + padded(outputs);

@@ -11,6 +11,7 @@ use crate::model::{Ground, Model};
 use crate::plan::Train;
 use crate::report::{Progress, Trained, Watch};
 use crate::run::Run;
+use crate::schedule;
 use crate::source::Source;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -80,6 +81,8 @@ pub fn watched(
     } else if config.first_latents() == FirstLatents::Components && resumed.is_none() {
         first_latents::set(&ground, &mut model.latents);
     }
+    let texels = ground.texels.count();
+    let mut rounds = schedule::rounds(config, &stages, texels);
     let mut budget = None;
     let position = match resumed {
         Some(path) => {
@@ -93,6 +96,7 @@ pub fn watched(
         None => {
             if let Some(seconds) = config.seconds {
                 let fitted = Budget::fit(&ground, &model, &mut stages, device, (seconds, started))?;
+                rounds = fitted.rounds;
                 budget = Some(fitted);
             }
             Position {
@@ -101,6 +105,7 @@ pub fn watched(
                 loss: f64::NAN,
                 least: f64::NAN,
                 seconds: 0.0,
+                rounds,
                 extents: Extent::of(&stages),
             }
         }
@@ -112,5 +117,5 @@ pub fn watched(
         run.resumed_from(path);
     }
     run.all_stages(stop, watch)?;
-    run.finish()
+    run.finish(stop, watch)
 }

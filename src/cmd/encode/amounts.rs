@@ -47,7 +47,7 @@ pub(super) fn bytes(text: &str) -> Result<u64, String> {
 }
 
 /// A map and its weight of `normal=2`.
-pub(super) fn weight(text: &str) -> Result<(String, f64), String> {
+pub(crate) fn weight(text: &str) -> Result<(String, f64), String> {
     let found = text
         .split_once('=')
         .and_then(|(map, weight)| Some((map.to_owned(), weight.parse().ok()?)));

@@ -1,7 +1,7 @@
 //! Log: a line of JSON for every observation of a run.
 
 use anyhow::Context as _;
-use ntmu::trainer::Progress;
+use ntmu::trainer::{Progress, Round};
 use serde_json::{Value, json};
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Write as _};
@@ -63,6 +63,17 @@ impl Log {
             "deployed_psnr": progress.deployed_psnr,
             "rates": progress.rates,
         });
+        self.put(&line)
+    }
+
+    /// A round of settling: a resumed run goes through all of them again.
+    pub(super) fn write_round(&mut self, round: &Round) -> anyhow::Result<()> {
+        let Round { moved, psnr } = round;
+        self.put(&json!({ "stage": "settling", "moved": moved, "deployed_psnr": psnr }))
+    }
+
+    fn put(&mut self, line: &Value) -> anyhow::Result<()> {
+        let found = || format!("log {}", self.path.display());
         writeln!(self.file, "{line}").with_context(found)?;
         // A line is there for whoever follows the file, and for whoever resumes the run.
         self.file.flush().with_context(found)

@@ -3,7 +3,7 @@
 use super::curve::Curve;
 use crate::console;
 use indicatif::{ProgressBar, ProgressStyle};
-use ntmu::trainer::Progress;
+use ntmu::trainer::{Progress, Round};
 
 /// The progress line.
 ///
@@ -47,6 +47,16 @@ impl Line {
         self.bar.set_position(progress.step);
         self.bar
             .set_message(format!("{}  {}", figures(progress), self.curve.text()));
+    }
+
+    pub(super) fn show_round(&self, round: &Round) {
+        let Round { moved, psnr } = round;
+        let text = format!("settling  {moved} latents moved  deployed {psnr:.2} dB");
+        if self.bar.is_hidden() {
+            console::note(&text);
+        } else {
+            self.bar.set_message(text);
+        }
     }
 
     pub(super) fn finish(&self) {

@@ -35,6 +35,7 @@ impl Encode {
         config.weights.extend(self.weight.iter().cloned());
         config.rate_factor = self.rate_factor.unwrap_or(config.rate_factor);
         config.seconds = self.time.or(config.seconds);
+        config.settle = self.settle.or(config.settle);
         config.target_psnr = self.target_psnr.or(config.target_psnr);
         self.shape(&mut config)?;
         config.validate()?;

@@ -5,7 +5,7 @@ use super::log::Log;
 use super::preview::Preview;
 use super::progress::Line;
 use ntmu::isa::Asset;
-use ntmu::trainer::{Progress, Watch};
+use ntmu::trainer::{Progress, Round, Watch};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -47,6 +47,14 @@ impl Watch for Watcher {
         self.line.show(progress);
         if let Some(log) = &mut self.log {
             let outcome = log.write(progress);
+            self.note(outcome);
+        }
+    }
+
+    fn settled(&mut self, round: &Round) {
+        self.line.show_round(round);
+        if let Some(log) = &mut self.log {
+            let outcome = log.write_round(round);
             self.note(outcome);
         }
     }

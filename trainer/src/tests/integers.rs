@@ -6,9 +6,9 @@ use crate::batch::all_texels;
 use crate::model::Ground;
 use crate::sampler::{Numbers, Texel, Window};
 use crate::{
-    ActivationKind, Address, GridSampling, Precision, Pyramid, Snap, Source, TrainConfig, Trained,
-    WaveForm,
+    ActivationKind, Address, GridSampling, Precision, Pyramid, Snap, Source, TrainConfig, WaveForm,
 };
+use ntmu_isa::Asset;
 
 /// Configurations that between them use every kind of input.
 fn embeddings() -> Vec<TrainConfig> {
@@ -86,8 +86,7 @@ fn the_sampler_gives_isas_integers_at_every_texel() {
 }
 
 /// The decibels of the codes that isa's functions decode from an asset.
-fn decibels_by_isa(source: &Source, trained: &Trained) -> f64 {
-    let asset = &trained.asset;
+pub(super) fn decibels_by_isa(source: &Source, asset: &Asset) -> f64 {
     let (mut sum, mut count) = (0.0, 0_u32);
     for (mip, reals) in source.mips.iter().enumerate() {
         let (channels, height, width) = reals.dim();
@@ -111,7 +110,8 @@ fn decibels_by_isa(source: &Source, trained: &Trained) -> f64 {
 fn assert_the_export_is_what_was_trained(config: &TrainConfig) {
     let source = source(40, 24, 5);
     let trained = run(&source, config).unwrap();
-    let difference = (decibels_by_isa(&source, &trained) - trained.report.psnr_quantised).abs();
+    let difference =
+        (decibels_by_isa(&source, &trained.asset) - trained.report.psnr_quantised).abs();
     // The same terms in another order of summation in doubles, and one f32 division that may
     // differ in its last place: one 8-bit code that differs would show at about 1e-5, one 16-bit
     // code at about 2e-7.
@@ -217,7 +217,7 @@ fn halves_exported_from_reals_keep_the_quality() {
             ..small()
         };
         let trained = run(&source, &config).unwrap();
-        let difference = decibels_by_isa(&source, &trained) - trained.report.psnr_float;
+        let difference = decibels_by_isa(&source, &trained.asset) - trained.report.psnr_float;
         assert!(difference.abs() < 0.05, "{activation:?}: {difference}");
     }
 }

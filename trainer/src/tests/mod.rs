@@ -8,6 +8,7 @@ mod plans;
 mod pyramids;
 mod runs;
 mod safety;
+mod settling;
 
 use crate::{GridConfig, Plan, Source, TrainConfig, TrainError, Trained, TrainingDevice, train};
 use ndarray::Array3;

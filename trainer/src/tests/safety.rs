@@ -106,6 +106,7 @@ fn a_loss_that_is_no_number_names_its_step() {
         loss: 0.1,
         least: 0.1,
         seconds: 0.0,
+        rounds: 0,
         extents: checkpoint::Extent::of(&stages),
     };
     let identity = checkpoint::identity(&ground).unwrap();
