@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 /// tell, as another default of training does.
 const fn evaluation(codec: &Codec) -> u32 {
     match codec {
-        Codec::Neural(_) => 4,
+        Codec::Neural(_) => 5,
         Codec::Astc { .. } | Codec::Bc { .. } => 1,
     }
 }

@@ -37,7 +37,8 @@ pub struct SetSummary {
     pub set: String,
     /// The finished points with their curve's name, in the plan's order.
     pub rows: Vec<Row>,
-    /// BD-rate and BD-PSNR of every curve against every other.
+    /// BD-rate and BD-PSNR of every curve of more than one point against every other such curve,
+    /// where there are two.
     pub bd: Option<Matrix>,
     #[serde(skip)]
     curves: Vec<Curve>,
@@ -48,9 +49,21 @@ pub struct SetSummary {
 pub struct Row {
     /// The curve.
     pub curve: String,
+    /// Where every curve of the plan has one point: how this one differs from the first, none while
+    /// that is not finished.
+    pub change: Option<Change>,
     /// All else, without the figures of every mip.
     #[serde(flatten)]
     pub result: PointResult,
+}
+
+/// How a point differs from another.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// In percent of the other's rate.
+    pub rate: f64,
+    /// In dB.
+    pub psnr: f64,
 }
 
 /// The sets together, each with the same weight.
@@ -71,6 +84,8 @@ pub struct Mean {
 pub struct MeanCurve {
     /// Its name.
     pub curve: String,
+    /// The mean of the sets' changes.
+    pub change: Option<Change>,
     /// Its points.
     pub points: Vec<CurvePoint>,
 }
@@ -114,13 +129,24 @@ pub fn summarise(evaluation: &Evaluation) -> Result<Summary, EvaluateError> {
             result.quality = serde_json::Value::Null;
             result.details = serde_json::Value::Null;
             let curve = evaluation.plan.curves[point.curve].name.clone();
-            rows.push(Row { curve, result });
+            rows.push(Row {
+                curve,
+                change: None,
+                result,
+            });
         }
+        set_changes(evaluation, &mut rows);
         let curves = set_curves(evaluation, &set.name, &rows)?;
+        let planned = evaluation.plan.curves.iter();
+        let several: Vec<Curve> = planned
+            .filter(|planned| planned.codecs.len() > 1)
+            .filter_map(|planned| curves.iter().find(|curve| curve.name() == planned.name))
+            .cloned()
+            .collect();
         summary.sets.push(SetSummary {
             set: set.name.clone(),
-            bd: (!curves.is_empty())
-                .then(|| curves::matrix(&curves))
+            bd: (several.len() > 1)
+                .then(|| curves::matrix(&several))
                 .transpose()?,
             rows,
             curves,
@@ -131,6 +157,25 @@ pub fn summarise(evaluation: &Evaluation) -> Result<Summary, EvaluateError> {
         summary.mean = Some(mean(evaluation, &summary.sets)?);
     }
     Ok(summary)
+}
+
+/// Compares every row with the first point of the plan, where no curve has a second.
+fn set_changes(evaluation: &Evaluation, rows: &mut [Row]) {
+    let planned = &evaluation.plan.curves;
+    if planned.len() < 2 || planned.iter().any(|curve| curve.codecs.len() > 1) {
+        return;
+    }
+    let of = |row: &Row| Some((row.result.bppc, row.result.psnr?));
+    let first = rows.first().filter(|row| row.curve == planned[0].name);
+    let Some((rate, psnr)) = first.and_then(of) else {
+        return;
+    };
+    for row in rows {
+        row.change = of(row).map(|found| Change {
+            rate: 100.0 * (found.0 / rate - 1.0),
+            psnr: found.1 - psnr,
+        });
+    }
 }
 
 /// The points of a curve; those that equal their source have no PSNR and cannot be drawn.
@@ -225,6 +270,7 @@ fn mean(evaluation: &Evaluation, sets: &[SetSummary]) -> Result<Mean, EvaluateEr
         )?);
         means.push(MeanCurve {
             curve: planned.name.clone(),
+            change: mean_change(sets, &planned.name),
             points,
         });
     }
@@ -257,6 +303,21 @@ fn mean(evaluation: &Evaluation, sets: &[SetSummary]) -> Result<Mean, EvaluateEr
         bd_psnr: deltas(|matrix| &matrix.psnrs),
         curves: means,
         plotted,
+    })
+}
+
+/// The mean of a curve's changes, where every set has one.
+fn mean_change(sets: &[SetSummary], curve: &str) -> Option<Change> {
+    let changes = sets.iter().map(|set| {
+        let row = set.rows.iter().find(|row| row.curve == curve);
+        row.and_then(|row| row.change)
+    });
+    let changes = changes.collect::<Option<Vec<Change>>>()?;
+    let mean =
+        |part: fn(&Change) -> f64| changes.iter().map(part).sum::<f64>() / changes.len() as f64;
+    Some(Change {
+        rate: mean(|change| change.rate),
+        psnr: mean(|change| change.psnr),
     })
 }
 

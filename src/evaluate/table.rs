@@ -1,6 +1,6 @@
 //! Table: a summary as Markdown.
 
-use super::summary::{Mean, MeanDelta, SetSummary, Summary};
+use super::summary::{Change, Mean, MeanDelta, SetSummary, Summary};
 use std::fmt::Write as _;
 
 /// Writing to a string cannot fail, so the result is dropped.
@@ -65,6 +65,10 @@ fn of_set(text: &mut String, set: &SetSummary) {
         .map(|map| map.name.as_str())
         .collect();
     let mut header = vec!["curve", "point", "BPPC", "mip 0", "PSNR, dB", "SSIM"];
+    let are_changes = set.rows.iter().any(|row| row.change.is_some());
+    if are_changes {
+        header.extend(CHANGES);
+    }
     header.extend(&maps);
     header.push("seconds");
     let rows = set.rows.iter().map(|row| {
@@ -79,6 +83,9 @@ fn of_set(text: &mut String, set: &SetSummary) {
             decibels(result.psnr),
             format!("{:.4}", result.ssim),
         ];
+        if are_changes {
+            cells.extend(changes(row.change));
+        }
         cells.extend(result.maps.iter().map(|map| decibels(map.psnr)));
         cells.push(format!("{:.1}", result.encode_seconds));
         cells
@@ -92,21 +99,33 @@ fn of_set(text: &mut String, set: &SetSummary) {
 
 fn of_mean(text: &mut String, mean: &Mean, sets: usize) {
     line!(text, "\n## Mean of {sets} sets\n");
-    let header = ["curve", "point", "BPPC", "PSNR, dB", "SSIM", "seconds"];
+    let mut header = vec!["curve", "point", "BPPC", "PSNR, dB", "SSIM", "seconds"];
+    let are_changes = mean.curves.iter().any(|curve| curve.change.is_some());
+    if are_changes {
+        header.extend(CHANGES);
+    }
     let rows = mean.curves.iter().flat_map(|curve| {
-        curve.points.iter().map(|point| {
-            vec![
+        curve.points.iter().map(move |point| {
+            let mut cells = vec![
                 curve.curve.clone(),
                 point.label.clone(),
                 format!("{:.4}", point.bppc),
                 format!("{:.2}", point.psnr),
                 format!("{:.4}", point.ssim),
                 format!("{:.1}", point.encode_seconds),
-            ]
+            ];
+            if are_changes {
+                cells.extend(changes(curve.change));
+            }
+            cells
         })
     });
     table(text, &header, rows);
     line!(text, "\n![](plots/mean.psnr.svg)");
+    let are_deltas = mean.bd_rate.iter().flatten().any(|delta| delta.sets > 0);
+    if !are_deltas {
+        return;
+    }
     for (name, deltas) in [
         ("BD-rate, %", &mean.bd_rate),
         ("BD-PSNR, dB", &mean.bd_psnr),
@@ -129,6 +148,15 @@ fn of_mean(text: &mut String, mean: &Mean, sets: usize) {
         });
         table(text, &header, rows);
     }
+}
+
+/// The columns of changes against a plan's first point.
+const CHANGES: [&str; 2] = ["rate", "PSNR"];
+
+fn changes(change: Option<Change>) -> [String; 2] {
+    change.map_or_else(Default::default, |Change { rate, psnr }| {
+        [format!("{rate:+.1} %"), format!("{psnr:+.2} dB")]
+    })
 }
 
 fn mean_delta(delta: MeanDelta, sets: usize) -> String {

@@ -305,6 +305,44 @@ fn a_summary_has_every_point_and_what_is_missing() {
 }
 
 #[test]
+fn curves_of_one_point_each_are_compared_with_the_first() {
+    let text = PLAN.replace("\"together\", ", "")
+        + "[[curve]]\nname = \"BC together\"\ncodec = \"bc\"\nscalars = [\"together\"]\n";
+    let folder = tempfile::tempdir().unwrap();
+    let evaluation = Evaluation::new(parse(&text).unwrap(), folder.path()).unwrap();
+    run(&evaluation, usize::MAX);
+    let summary = summarise(&evaluation).unwrap();
+    let mut sums = [0.0; 2];
+    for set in &summary.sets {
+        assert!(set.bd.is_none());
+        let [first, second] = &set.rows[..] else {
+            panic!("{:?}", set.rows);
+        };
+        let change = first.change.unwrap();
+        assert_eq!((change.rate, change.psnr), (0.0, 0.0));
+        let change = second.change.unwrap();
+        let rate = 100.0 * (second.result.bppc - first.result.bppc) / first.result.bppc;
+        assert!((change.rate - rate).abs() < 1e-9, "{change:?} {rate}");
+        let psnr = second.result.psnr.unwrap() - first.result.psnr.unwrap();
+        assert!((change.psnr - psnr).abs() < 1e-9, "{change:?} {psnr}");
+        assert!(rate != 0.0 && psnr != 0.0);
+        sums[0] += rate / 2.0;
+        sums[1] += psnr / 2.0;
+    }
+    let text = summary.markdown();
+    assert!(
+        text.contains(&format!("| {:+.1} % | {:+.2} dB |", sums[0], sums[1])),
+        "{text}"
+    );
+    assert!(!text.contains("BD-rate"), "{text}");
+    // With a second rate on one of them they are curves again.
+    let whole = Evaluation::new(parse(PLAN).unwrap(), folder.path()).unwrap();
+    run(&whole, usize::MAX);
+    let rows = summarise(&whole).unwrap().sets.remove(0).rows;
+    assert!(rows.iter().all(|row| row.change.is_none()));
+}
+
+#[test]
 fn a_result_is_read_back_as_it_was_written() {
     let folder = tempfile::tempdir().unwrap();
     let evaluation = Evaluation::new(parse(PLAN).unwrap(), folder.path()).unwrap();
