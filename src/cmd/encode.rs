@@ -35,8 +35,8 @@ pub(crate) struct Encode {
     /// run.
     #[arg(long, value_name = "STEPS", conflicts_with = "time")]
     steps: Option<String>,
-    /// Rounds in which latents settle when training is over; as many as suit the effort or the time
-    /// by default, none after a plan.
+    /// Rounds in which latents settle when training is over. By default as many as suit the effort or
+    /// the time and still bring something, none after a plan.
     #[arg(long, value_name = "ROUNDS")]
     settle: Option<u32>,
     /// Train the latents directly in the plan's encoder stages, for as many steps.

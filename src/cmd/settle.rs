@@ -14,7 +14,7 @@ pub(crate) struct Settle {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Rounds; one in which nothing moves is the last.
-    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100))]
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
     rounds: u32,
     /// How much a map's error counts, `normal=2`; 1 without it. Can be repeated.
     #[arg(long, value_name = "MAP=WEIGHT", value_parser = super::encode::weight)]

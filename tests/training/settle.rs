@@ -63,7 +63,7 @@ fn encode_ends_with_what_settle_does() {
         let name = format!("{rounds}.ntx");
         done(folder, &encode(&name, &[&steps[..], &[rounds]].concat()));
     }
-    settled(folder, "0.ntx", &[]);
+    settled(folder, "0.ntx", &["--rounds", "2"]);
     let [own, later] =
         ["2.ntx", "settled.ntx"].map(|name| Asset::from_bytes(&read(folder, name)).unwrap());
     assert_eq!(own.grids, later.grids);

@@ -33,7 +33,7 @@ const WARM_UP: u64 = 2;
 const AT_ONCE: u64 = 16;
 
 /// The share of the time in which latents settle.
-const SETTLING: f64 = 0.1;
+const SETTLING: f64 = 1.0 / 6.0;
 
 /// Decodes of the whole set that a round of settling costs: eight, each with the comparison of all
 /// errors.
@@ -51,7 +51,7 @@ pub(crate) struct Budget {
     costs: Vec<f64>,
     /// Seconds that settling, and looking at the whole set, take when the steps are over.
     ending: f64,
-    /// Rounds in which latents settle.
+    /// The most rounds in which latents settle.
     pub(crate) rounds: u32,
 }
 

@@ -32,7 +32,7 @@ pub(crate) struct Position {
     pub(crate) least: f64,
     /// Seconds that the run has taken so far.
     pub(crate) seconds: f64,
-    /// Rounds in which latents settle after the last stage.
+    /// The most rounds in which latents settle after the last stage.
     pub(crate) rounds: u32,
     /// What a budget of time has fixed of each stage that runs.
     pub(crate) extents: Vec<Extent>,

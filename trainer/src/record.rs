@@ -22,7 +22,7 @@ pub(crate) fn steps(config: &TrainConfig, stages: &[Stage]) -> Vec<u64> {
 pub(crate) fn of(
     config: &TrainConfig,
     stages: &[Stage],
-    rounds: u32,
+    rounds: usize,
     device: &TrainingDevice,
     psnrs: [f64; 2],
 ) -> Vec<(String, String)> {

@@ -11,6 +11,7 @@ use crate::plan::Train;
 use crate::record;
 use crate::report::{Progress, StageReport, TrainReport, Trained, Watch};
 use crate::sampler::Numbers;
+use crate::schedule;
 use crate::settle::{self, Round, Settling};
 use crate::stage::Stage;
 use crate::stepper::Stepper;
@@ -388,7 +389,9 @@ impl<'a> Run<'a> {
         } = &self.ground;
         let asset = asset_of(&self.model, &self.ground, Vec::new())?;
         let mut settling = Settling::new(asset, texels, positions)?;
-        let rounds = settling.rounds(self.position.rounds, stop, &mut |r| watch.settled(r));
+        let least = schedule::least_gain(self.ground.config);
+        let most = self.position.rounds;
+        let rounds = settling.rounds(most, least, stop, &mut |r| watch.settled(r));
         if let (Err(TrainError::Stopped { step, .. }), Some(path)) = (&rounds, self.checkpoint) {
             let step = *step;
             self.save(path)?;
@@ -420,12 +423,11 @@ impl<'a> Run<'a> {
             stages,
             device,
             reports,
-            position,
             ..
         } = self;
         let psnr_quantised = decibels(errors.overall());
         let psnrs = [psnr_float, psnr_quantised];
-        let record = record::of(ground.config, &stages, position.rounds, device, psnrs);
+        let record = record::of(ground.config, &stages, settled.len(), device, psnrs);
         let asset = asset_of(&model, &ground, record)?;
         let (width, height) = ground.texels.sizes[0];
         let texels = f64::from(width) * f64::from(height);

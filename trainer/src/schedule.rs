@@ -101,14 +101,26 @@ pub(crate) fn haste(steps: f64) -> f64 {
     (LONG_FALL / steps.max(1.0)).sqrt().max(1.0)
 }
 
-/// Passes over the texels for which latents settle once: a round costs about as much as one and a
-/// half, so that it takes a tenth of the time.
-const PASSES_PER_ROUND: f64 = 15.0;
+/// Passes over the texels for which latents may settle once: a round costs about as much as two.
+const PASSES_PER_ROUND: f64 = 4.0;
 
 /// Rounds beyond which hardly a latent moves.
 pub(crate) const MOST_ROUNDS: u32 = 8;
 
-/// Rounds in which latents settle after these stages on a set of so many texels.
+/// What a round has to bring if another is to follow, in decibels, where nobody has fixed how many
+/// there are: about what training brings in its time.
+const LEAST_GAIN: f64 = 0.03;
+
+/// See [`LEAST_GAIN`].
+pub(crate) fn least_gain(config: &TrainConfig) -> f64 {
+    if config.settle.is_none() {
+        LEAST_GAIN
+    } else {
+        0.0
+    }
+}
+
+/// The most rounds in which latents settle after these stages on a set of so many texels.
 pub(crate) fn rounds(config: &TrainConfig, stages: &[Stage], texels: u64) -> u32 {
     if let Some(rounds) = config.settle {
         return rounds;

@@ -84,7 +84,7 @@ pub fn settle(
     let texels = Texels::new(source, weights)?;
     let positions = Positions::new(shape);
     let mut settling = Settling::new(asset.clone(), &texels, &positions)?;
-    let done = settling.rounds(rounds, stop, observe)?;
+    let done = settling.rounds(rounds, 0.0, stop, observe)?;
     Ok((settling.asset, done))
 }
 
@@ -153,13 +153,16 @@ impl<'a> Settling<'a> {
         Ok(settling)
     }
 
+    /// Rounds until one moves nothing or brings less than `least` decibels, `most` at the most.
     pub(crate) fn rounds(
         &mut self,
         most: u32,
+        least: f64,
         stop: &AtomicBool,
         observe: &mut dyn FnMut(&Round),
     ) -> Result<Vec<Round>, TrainError> {
         let mut rounds = Vec::new();
+        let mut before = self.psnr();
         for number in 0..most {
             let gradient = self.gradient();
             let mut moved = 0;
@@ -179,9 +182,10 @@ impl<'a> Settling<'a> {
             };
             observe(&round);
             rounds.push(round);
-            if moved == 0 {
+            if moved == 0 || round.psnr < before + least {
                 break;
             }
+            before = round.psnr;
         }
         Ok(rounds)
     }

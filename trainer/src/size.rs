@@ -49,7 +49,7 @@ pub fn asset_bytes(
     for stage in &mut stages {
         stage.steps = stage.steps.max(MOST_STEPS);
     }
-    let record = record::of(config, &stages, u32::MAX, device, [LONG; 2]);
+    let record = record::of(config, &stages, usize::MAX, device, [LONG; 2]);
     let shape = export::shape_of(config, source)?;
     let grids = [0, 1].map(|grid| vec![0; shape.grid_latents(grid) as usize]);
     let asset = export::asset(config, source, layers, grids, record)?;

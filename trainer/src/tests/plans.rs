@@ -174,6 +174,7 @@ fn a_budget_of_time_fixes_steps_with_which_the_run_can_be_repeated() {
     let repeated = TrainConfig {
         seconds: None,
         plan: Some(usual(steps)),
+        settle: Some(first.report.settled.len() as u32),
         ..timed
     };
     assert_eq!(run(&source, &repeated).unwrap().asset, first.asset);
@@ -203,6 +204,7 @@ fn a_run_that_a_time_gave_smaller_batches_keeps_them_when_it_is_resumed() {
     let repeated = TrainConfig {
         batch: stage.batch as u32,
         plan: Some(effort.usual_plan(steps)),
+        settle: Some(resumed.report.settled.len() as u32),
         ..effort
     };
     assert_eq!(run(&source, &repeated).unwrap().asset, resumed.asset);
