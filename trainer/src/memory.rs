@@ -26,13 +26,16 @@ pub struct Memory {
     pub step: u64,
     /// The list of all texels when the set is evaluated.
     pub evaluation: u64,
+    /// While latents settle: their values and gradients, codes before and after, errors before and
+    /// after.
+    pub settling: u64,
 }
 
 impl Memory {
     /// What is held at once at the most.
     #[must_use]
     pub fn peak(&self) -> u64 {
-        self.texels + self.model + self.step.max(self.evaluation)
+        self.texels + self.model + self.step.max(self.evaluation).max(self.settling)
     }
 
     /// The estimate for a run.
@@ -47,7 +50,7 @@ impl Memory {
         let sizes = source.sizes().into_iter();
         let texels: u64 = sizes.map(|(w, h)| u64::from(w) * u64::from(h)).sum();
         // Values, two moments, what the synthesizer sees, the gradient.
-        let latents: u64 = (0..2).map(|g| 5 * shape.grid_latents(g)).sum();
+        let latents: u64 = (0..2).map(|g| shape.grid_latents(g)).sum();
         // Values, two moments, and a gradient for each chunk and for all of them.
         let parameters = (3 + 1 + CHUNKS as u64) * topology.parameters as u64;
         let inputs = topology.layers.first().map_or(0, |l| l.rows()) as u64;
@@ -64,9 +67,10 @@ impl Memory {
         let running = stages.iter().filter(|stage| stage.steps > 0);
         Ok(Memory {
             texels: 2 * FLOAT * texels * channels as u64,
-            model: FLOAT * (latents + parameters),
+            model: FLOAT * (5 * latents + parameters),
             step: running.map(step).max().unwrap_or(0),
             evaluation: texels * size_of::<Texel>() as u64,
+            settling: latents * 2 * (FLOAT + 1) + texels * 2 * FLOAT,
         })
     }
 }
