@@ -33,7 +33,7 @@ const WARM_UP: u64 = 2;
 const AT_ONCE: u64 = 16;
 
 /// The share of the time in which latents settle.
-const SETTLING: f64 = 1.0 / 6.0;
+const SETTLING: f64 = 0.1;
 
 /// Decodes of the whole set that a round of settling costs: eight, each with the comparison of all
 /// errors.

@@ -114,7 +114,7 @@ pub struct TrainConfig {
     pub target_psnr: Option<f64>,
     /// Rounds in which latents settle when training is over, see [`crate::settle()`]. Without it, where
     /// the plan is an effort's, until a round brings less than 0.03 dB, but at most one for every four
-    /// passes over the texels, or as many as fit a sixth of the time, and never more than eight; none
+    /// passes over the texels, or as many as fit a tenth of the time, and never more than eight; none
     /// for other plans.
     pub settle: Option<u32>,
     /// The seed of every random number.
