@@ -37,6 +37,14 @@ pub struct Neural {
     pub seed: u64,
 }
 
+impl Neural {
+    /// Whether weights have other bits than the preset's.
+    pub(super) fn sets_weight_bits(&self) -> bool {
+        let fields = ["weight_bits", "weight_bits_per_layer"];
+        fields.iter().any(|&field| self.config.contains_key(field))
+    }
+}
+
 /// One way of coding a set, at one rate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "codec", rename_all = "kebab-case")]

@@ -7,8 +7,9 @@ use sha2::{Digest, Sha256};
 
 /// Raised when a change makes points of a codec come out otherwise that their configuration does not
 /// tell, as another default of training does.
-const fn evaluation(codec: &Codec) -> u32 {
+fn evaluation(codec: &Codec) -> u32 {
     match codec {
+        Codec::Neural(neural) if neural.sets_weight_bits() => 6,
         Codec::Neural(_) => 5,
         Codec::Astc { .. } | Codec::Bc { .. } => 1,
     }

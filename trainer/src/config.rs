@@ -177,13 +177,6 @@ impl TrainConfig {
             .unwrap_or(self.weight_bits)
     }
 
-    /// The fewest bits of any layer's weights.
-    pub(crate) fn least_weight_bits(&self) -> u8 {
-        let layers = 0..self.layer_count();
-        let bits = layers.map(|layer| self.weight_bits_of(layer));
-        bits.min().unwrap_or(self.weight_bits)
-    }
-
     /// The synthesizer's learning rate where a plan has none, in a short stage.
     pub(crate) fn own_synthesizer_rate(&self) -> f64 {
         let widest = self.hidden.iter().copied().max().unwrap_or(0);

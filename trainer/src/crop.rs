@@ -2,7 +2,6 @@
 
 use crate::adam::Rate;
 use crate::constructor::{Constructors, Piece};
-use crate::descent::Descent;
 use crate::encoder::{Encoder, RECEPTIVE, SCALE_LOG2};
 use crate::engine::{Engine, View};
 use crate::error::TrainError;
@@ -350,16 +349,12 @@ impl Model {
             });
             out
         });
-        if let Some(quantised) = &quantised {
-            quantised.to_real_gradient(&ground.topology, &mut engine.parameters);
-        }
-        ground.hold_constants(&mut engine.parameters);
         let gradient = encoder.backward(pass, of_tensors)?;
         let of_encoder = Rate::new(rates.encoder, step + 1);
-        let of_synthesizer = Descent::new(stage.optimiser, rates.synthesizer, step + 1);
         self.encoder_moments
             .update(of_encoder, &mut self.encoder, &gradient);
-        self.follow(ground, of_synthesizer, &engine.parameters);
+        let gradient = &mut engine.parameters;
+        self.follow(ground, stage, step, rates, quantised.as_ref(), gradient);
         Ok(loss)
     }
 

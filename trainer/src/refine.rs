@@ -14,6 +14,7 @@ use crate::plan::{Shown, Train};
 use crate::quantise::{Quantised, quantise};
 use crate::random::{Purpose, Stream};
 use crate::sampler::{Numbers, Texel, Window};
+use crate::schedule;
 use crate::stage::{Rates, Stage};
 
 /// Texels that calibrate the activations.
@@ -139,12 +140,8 @@ impl Model {
                 engine.step(self.view(ground, &network, numbers, &windows))
             }
         };
-        if let Some(q) = &quantised {
-            q.to_real_gradient(&ground.topology, &mut engine.parameters);
-        }
-        ground.hold_constants(&mut engine.parameters);
-        let descent = Descent::new(stage.optimiser, rates.synthesizer, step + 1);
-        self.follow(ground, descent, &engine.parameters);
+        let gradient = &mut engine.parameters;
+        self.follow(ground, stage, step, rates, quantised.as_ref(), gradient);
         if stage.train == Train::Latents {
             let embedding = ground.embedding(numbers);
             let [g0, g1] = &mut self.latents;
@@ -158,10 +155,29 @@ impl Model {
         loss
     }
 
-    /// Moves the synthesizer's parameters along their gradient.
-    pub(crate) fn follow(&mut self, ground: &Ground<'_>, descent: Descent, gradient: &[f32]) {
+    /// Moves the synthesizer's parameters along their gradient at a step. It is that of the real
+    /// parameters, or of what they were quantised to.
+    pub(crate) fn follow(
+        &mut self,
+        ground: &Ground<'_>,
+        stage: &Stage,
+        step: u64,
+        rates: Rates,
+        quantised: Option<&Quantised>,
+        gradient: &mut [f32],
+    ) {
+        let topology = &ground.topology;
+        if let Some(quantised) = quantised {
+            quantised.to_real_gradient(topology, gradient);
+        }
+        ground.hold_constants(gradient);
+        let descent = Descent::new(stage.optimiser, rates.synthesizer, step + 1);
         let (moments, parameters) = (&mut self.moments, &mut self.parameters);
-        descent.update(&ground.topology, moments, parameters, gradient);
+        descent.update(topology, moments, parameters, gradient);
+        if let Some(quantised) = quantised {
+            let share = schedule::draw(step, stage.steps) as f32;
+            quantised.draw(ground.config, topology, parameters, share);
+        }
     }
 
     /// The error over every texel, in reals or in the asset's numbers.

@@ -1,5 +1,6 @@
 //! Schedule: the plan that follows from an effort, and the learning rate at each step of a stage.
 
+use crate::choices::Precision;
 use crate::config::{CHUNKS, TILE, TrainConfig};
 use crate::plan::{Arithmetic, Fall, Mips, Plan, RatesPlan, Shown, StagePlan, Train};
 use crate::stage::Stage;
@@ -11,9 +12,15 @@ const PASSES: [(f64, f64); 4] = [(0.0, 8.0), (10.0, 30.0), (50.0, 240.0), (100.0
 /// The share of those passes that the integer stage has.
 const INTEGER_SHARE: f64 = 0.25;
 
-/// The same where weights have fewer bits than [`FEW_BITS`]: they have more to learn there.
+/// The same where any layer's weights have few bits: they have more to learn there.
 const FEW_BITS_SHARE: f64 = 0.5;
+
+/// Weights of fewer bits have few.
 const FEW_BITS: u8 = 7;
+
+/// The share of the way to its code that a weight of few bits is drawn in a step at the end of a
+/// stage in the numbers of the decode.
+const DRAW: f64 = 0.025;
 
 /// The least steps of the two stages together, for each pass: what a set smaller than a batch
 /// gets.
@@ -41,7 +48,8 @@ pub(crate) fn plan(config: &TrainConfig, texels: u64, batch: usize) -> Plan {
     let steps = (passes * texels as f64 / batch as f64)
         .max(LEAST * passes)
         .round();
-    let share = if config.least_weight_bits() < FEW_BITS {
+    let any_has_few = (0..config.layer_count()).any(|layer| config.has_few_bits(layer));
+    let share = if any_has_few {
         FEW_BITS_SHARE
     } else {
         INTEGER_SHARE
@@ -134,6 +142,12 @@ pub(crate) fn rounds(config: &TrainConfig, stages: &[Stage], texels: u64) -> u32
     rounds.clamp(1, MOST_ROUNDS)
 }
 
+/// The share of the way to its code that a weight of few bits is drawn at step `step` (from 0) of
+/// `steps`: nothing at first, most of [`DRAW`] soon.
+pub(crate) fn draw(step: u64, steps: u64) -> f64 {
+    DRAW * (step as f64 / steps.max(1) as f64).sqrt()
+}
+
 /// Whether the plan is that of an effort, with whatever steps.
 pub(crate) fn follows_effort(config: &TrainConfig) -> bool {
     let plan = config.plan.as_ref();
@@ -167,6 +181,11 @@ impl TrainConfig {
 }
 
 impl TrainConfig {
+    /// Whether a layer's weights have so few bits that they are trained with more care.
+    pub(crate) fn has_few_bits(&self, layer: usize) -> bool {
+        self.precision_of(layer) == Precision::Int8 && self.weight_bits_of(layer) < FEW_BITS
+    }
+
     /// The plan that an effort gives, with these steps: encoder, latents in reals, latents in the
     /// numbers of the decode. The last two share one fall of the rates: the first half of it
     /// and the second, whatever their steps.
